@@ -1,0 +1,219 @@
+"""What each subcommand of ``a2g`` does; the command line itself is in :mod:`a2g_jax.cli`."""
+
+import argparse
+import dataclasses
+import os
+import sys
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jax
+from tqdm import tqdm
+
+from a2g_jax.config import parse_text
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.folder import find_pairs, read_pair
+from a2g_jax.data.prepare import Prepared, prepare_recording, write_corpus
+from a2g_jax.data.talker.recordings import cast, talk
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.generation.deliver import check_formats, deliver
+from a2g_jax.io.audio import read_audio
+from a2g_jax.models import find_model
+from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig
+from a2g_jax.training.loop import train
+from a2g_jax.training.run import Run, RunConfig, load_run
+
+#: The demo's own speech: who says it, for how long, and from which seed (one that no training corpus uses).
+DEMO_SPEECH: dict[str, Any] = {"seconds": 20.0, "seed": 20211011, "speaker": "chiara", "emotion": "neutral"}
+#: What ``a2g demo --train`` trains on, minutes.
+DEMO_MINUTES = 20.0
+
+
+def _cache_compilations() -> None:
+    """Keep compiled programs between runs; XLA compiles for seconds what it runs in milliseconds."""
+    if jax.config.jax_compilation_cache_dir is None:
+        home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+        jax.config.update("jax_compilation_cache_dir", str(home / "a2g_jax" / "xla"))
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr)
+
+
+def _progress(items: Any, total: int, what: str, unit: str) -> tqdm:
+    return tqdm(
+        items, total=total, desc=what, unit=unit, file=sys.stderr, mininterval=0.5 if sys.stderr.isatty() else 10
+    )
+
+
+def demo_run() -> Run:
+    """The weights that come with the package."""
+    with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
+        return load_run(folder)
+
+
+def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
+    """``a2g prepare``."""
+    if options.reader == "talker":
+        if options.source is not None:
+            raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
+        corpus = prepare_talker(options.out, options.minutes, options.seed, options.fps)
+    else:
+        if options.source is None:
+            raise InputError("name the folder: a2g prepare folder SOURCE --out CORPUS.")
+        corpus = prepare_folder(options.source, options.out, options.seed, options.fps, options.joints)
+    seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
+    print(
+        f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
+        f" {corpus.skeleton.joints} joints at {corpus.fps:g} fps ("
+        + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
+        + ")"
+    )
+
+
+def prepare_talker(out: str | Path, minutes: float, seed: int, fps: float) -> Corpus:
+    """A generated corpus of so many minutes."""
+    mel = MelConfig()
+    roles = cast(minutes, seed)
+
+    def rows():
+        for role in _progress(roles, len(roles), "generating", "recording"):
+            yield prepare_recording(talk(**role, fps=fps, sample_rate=mel.sample_rate), fps, mel)
+
+    recipe = {"reader": "talker", "minutes": minutes, "seed": seed, "roles": roles}
+    return write_corpus(out, rows(), fps=fps, mel=mel, recipe=recipe, seed=seed, report=_say)
+
+
+def prepare_folder(source: str | Path, out: str | Path, seed: int, fps: float, joints: str) -> Corpus:
+    """A corpus from the user's own WAV and BVH files."""
+    mel = MelConfig()
+    pairs = find_pairs(source)
+
+    def rows():
+        for audio, bvh in _progress(pairs, len(pairs), "preparing", "recording"):
+            prepared = prepare_recording(read_pair(audio, bvh, mel.sample_rate), fps, mel, joints)
+            if audio is pairs[0][0]:
+                _say(_joints_line(prepared, joints))
+            yield prepared
+
+    recipe = {"reader": "folder", "source": str(source), "seed": seed, "joints": joints}
+    return write_corpus(out, rows(), fps=fps, mel=mel, recipe=recipe, seed=seed, report=_say)
+
+
+def _joints_line(prepared: Prepared, joints: str) -> str:
+    count = prepared.skeleton.joints
+    if joints == "all":
+        return f"training on all {count} joints of the rig"
+    if count == 22:
+        return "found the 22 body joints by name; fingers and other joints are left out (--joints all keeps them)"
+    return f"the 22 body joints cannot all be found by name: training on all {count} joints of the rig"
+
+
+def parse_settings(pairs: list[str], model: Any, training: TrainConfig) -> tuple[Any, TrainConfig]:
+    """Settings objects with command-line flags such as ``--learning-rate 3e-4`` put in."""
+    fields = {field.name: owner for owner in (model, training) for field in dataclasses.fields(owner)}
+    changes: dict[str, dict[str, Any]] = {"model": {}, "training": {}}
+    rest = list(pairs)
+    while rest:
+        flag = rest.pop(0)
+        if not flag.startswith("--"):
+            raise InputError(f"unexpected argument {flag!r}; settings are written --name value.")
+        name, equals, text = flag[2:].partition("=")
+        name = name.replace("-", "_")
+        if name not in fields:
+            raise InputError(f"no setting --{name.replace('_', '-')}; 'a2g train MODEL --settings' lists them.")
+        owner = fields[name]
+        if not equals:
+            if rest and not rest[0].startswith("--"):
+                text = rest.pop(0)
+            elif isinstance(getattr(owner, name), bool):
+                text = "true"
+            else:
+                raise InputError(f"{flag}: needs a value.")
+        changes["model" if owner is model else "training"][name] = parse_text(type(owner), name, text)
+    return dataclasses.replace(model, **changes["model"]), dataclasses.replace(training, **changes["training"])
+
+
+def run_train(options: argparse.Namespace, extra: list[str]) -> None:
+    """``a2g train``."""
+    entry = find_model(options.model)
+    if options.preset not in entry.presets:
+        raise InputError(f"{options.model} has no preset {options.preset!r}; there are: {', '.join(entry.presets)}.")
+    model, training = parse_settings(extra, entry.presets[options.preset], TRAIN_PRESETS[options.preset])
+    if options.settings:
+        for owner in (model, training):
+            print(f"# {type(owner).__name__}")
+            for field in dataclasses.fields(owner):
+                value = getattr(owner, field.name)
+                text = ",".join(map(str, value)) if isinstance(value, tuple) else value
+                print(f"--{field.name.replace('_', '-')} {text}")
+        return
+    for name in ("corpus", "out"):
+        if getattr(options, name) is None:
+            raise InputError(f"--{name} is needed (see 'a2g train --help').")
+    run = run_training(options.model, options.preset, model, training, options.corpus, options.out, options.resume)
+    print(
+        f"{options.out}: trained for {run.steps} steps; next: a2g generate {options.out} --audio speech.wav --out DIR"
+    )
+
+
+def run_training(
+    name: str, preset: str, model: Any, training: TrainConfig, corpus: str | Path, out: str | Path, resume: bool
+) -> Run:
+    """Open the corpus and train."""
+    _cache_compilations()
+    opened = Corpus.open(corpus)
+    return train(RunConfig.of(name, preset, model, training, opened), opened, out, resume=resume)
+
+
+def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
+    """``a2g generate``."""
+    check_formats(options.formats)
+    _cache_compilations()
+    run = demo_run() if options.run == "demo" and not Path("demo/run.json").exists() else load_run(options.run)
+    audio = read_audio(options.audio, run.config.mel.sample_rate)
+    _generate(run, audio, options, Path(options.audio).name)
+
+
+def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:
+    """``a2g demo``."""
+    check_formats(options.formats)
+    _cache_compilations()
+    out = Path(options.out)
+    # Bad audio should be refused before minutes of training.
+    words: Any = ()
+    if options.audio is not None:
+        audio, title = read_audio(options.audio, MelConfig().sample_rate), Path(options.audio).name
+    else:
+        speech = talk(**DEMO_SPEECH)
+        audio, title, words = speech.audio, "a generated speech", speech.words
+    if options.train:
+        if not (out / "corpus").exists():
+            prepare_talker(out / "corpus", DEMO_MINUTES, 0, 30.0)
+        model = find_model("audio2gestures").presets["tiny"]
+        training = TRAIN_PRESETS["tiny"]
+        run = run_training("audio2gestures", "tiny", model, training, out / "corpus", out / "run", resume=True)
+    else:
+        run = demo_run()
+    _generate(run, audio, options, title, words)
+
+
+def _generate(run: Run, audio: Any, options: argparse.Namespace, title: str, words: Any = ()) -> None:
+    with tqdm(total=options.samples, desc="generating", unit="motion", file=sys.stderr) as bar:
+        written = deliver(
+            run,
+            audio,
+            options.out,
+            samples=options.samples,
+            seed=options.seed,
+            formats=options.formats,
+            title=title,
+            words=words,
+            report=lambda done: bar.update(done - bar.n),
+        )
+    kinds = ", ".join(f"{count} {kind}" for kind, count in written.items())
+    print(f"{options.out}: {kinds}")
+    if "html" in written:
+        print(f"open {Path(options.out) / 'index.html'} in a browser")

@@ -1,0 +1,184 @@
+"""A prepared corpus on disk: features and motion at the same frame times, as memory-mapped arrays."""
+
+import os
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.splits import Segment, Splits
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.files import read_json
+
+FORMAT = "a2g_jax corpus"
+VERSION = 1
+MANIFEST = "manifest.json"
+#: The arrays of a corpus, all recordings one after the other: log-mel (N, bands), 6D rotations (N, J, 6), root (N, 3).
+ARRAYS = ("audio.npy", "pose.npy", "root.npy")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One recording of a corpus."""
+
+    name: str
+    first: int
+    """Row of its first frame in the arrays."""
+    frames: int
+    speaker: str
+    emotion: str
+    sources: dict[str, str]
+    """SHA-256 of each file it was read from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Corpus:
+    """An open corpus; its arrays are read from disk as they are used."""
+
+    path: Path
+    fps: float
+    mel: MelConfig
+    skeleton: Skeleton
+    recordings: tuple[Entry, ...]
+    splits: Splits
+    recipe: dict[str, Any]
+    """How it was made: reader, source, seed, options."""
+    fingerprint: str
+    """SHA-256 over the hashes of its arrays: equal data, equal fingerprint."""
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> "Corpus":
+        """Open a corpus folder.
+
+        Raises:
+            InputError: not a corpus, a damaged one, or one of a later version.
+        """
+        path = Path(path)
+        if not (path / MANIFEST).is_file():
+            raise InputError(f"{path}: is not a corpus (no {MANIFEST} in it); make one with 'a2g prepare'.")
+        manifest = read_json(path / MANIFEST)
+        if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+            raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
+        if manifest.get("version") != VERSION:
+            raise InputError(
+                f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION}; prepare it anew."
+            )
+        try:
+            corpus = cls(
+                path=path,
+                fps=float(manifest["fps"]),
+                mel=MelConfig(**manifest["mel"]),
+                skeleton=skeleton_from_json(manifest["skeleton"]),
+                recordings=tuple(Entry(**entry) for entry in manifest["recordings"]),
+                splits={name: [Segment(*row) for row in rows] for name, rows in manifest["splits"].items()},
+                recipe=manifest["recipe"],
+                fingerprint=manifest["fingerprint"],
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
+        corpus._check()
+        return corpus
+
+    def _check(self) -> None:
+        frames, joints = self.frames, self.skeleton.joints
+        for name, shape in zip(ARRAYS, ((frames, self.mel.bands), (frames, joints, 6), (frames, 3)), strict=True):
+            array = self._array(name)
+            if array.shape != shape or array.dtype != np.float32:
+                raise InputError(
+                    f"{self.path / name}: expected float32 {shape}; got {array.dtype} {array.shape}; prepare anew."
+                )
+
+    def _array(self, name: str) -> np.ndarray:
+        try:
+            return np.load(self.path / name, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise InputError(f"{self.path / name}: cannot be read ({error}); prepare the corpus anew.") from None
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of all recordings together."""
+        return sum(entry.frames for entry in self.recordings)
+
+    @cached_property
+    def audio(self) -> Float[np.ndarray, "N bands"]:
+        """Log-mel energies in dB."""
+        return self._array("audio.npy")
+
+    @cached_property
+    def pose(self) -> Float[np.ndarray, "N J 6"]:
+        """Local rotations, first two columns of each matrix."""
+        return self._array("pose.npy")
+
+    @cached_property
+    def root(self) -> Float[np.ndarray, "N 3"]:
+        """Root positions, metres."""
+        return self._array("root.npy")
+
+    @cached_property
+    def statistics(self) -> dict[str, Statistics]:
+        """``audio`` (bands,), ``pose`` (J, 6) and ``root`` (3,), over the training split only."""
+        path = self.path / "statistics.npz"
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                return {
+                    name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"])
+                    for name in ("audio", "pose", "root")
+                }
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: cannot be read ({error}); prepare the corpus anew.") from None
+
+    def segments(self, split: str) -> list[Segment]:
+        """The stretches of a split, as rows of the arrays.
+
+        Raises:
+            InputError: no such split, or an empty one.
+        """
+        if not self.splits.get(split):
+            there = ", ".join(name for name, rows in self.splits.items() if rows)
+            raise InputError(f"{self.path}: has no split {split!r}; there are: {there}.")
+        return [
+            Segment(index, self.recordings[index].first + start, self.recordings[index].first + stop)
+            for index, start, stop in self.splits[split]
+        ]
+
+    def motion(self, start: int, stop: int) -> Motion:
+        """The motion in rows ``start`` to ``stop`` of the arrays."""
+        rotations = np.asarray(matrix_from_6d(np.asarray(self.pose[start:stop])))
+        return Motion(rotations, np.asarray(self.root[start:stop]), self.skeleton, self.fps)
+
+    def annotations(self, recording: int) -> dict[str, Any]:
+        """Words and whatever else is known about a recording; times in seconds."""
+        return read_json(self.path / "annotations" / f"{recording:05d}.json")
+
+
+def skeleton_to_json(skeleton: Skeleton) -> dict[str, Any]:
+    """A skeleton as JSON values."""
+    return {
+        "names": list(skeleton.names),
+        "parents": list(skeleton.parents),
+        "offsets": np.asarray(skeleton.offsets).tolist(),
+        "ends": [[joint, list(offset)] for joint, offset in skeleton.ends],
+    }
+
+
+def skeleton_from_json(value: dict[str, Any]) -> Skeleton:
+    """Inverse of :func:`skeleton_to_json`."""
+    return Skeleton(
+        offsets=np.asarray(value["offsets"], np.float32).reshape(-1, 3),
+        names=tuple(value["names"]),
+        parents=tuple(value["parents"]),
+        ends=tuple((int(joint), (float(x), float(y), float(z))) for joint, (x, y, z) in value.get("ends", [])),
+    )
+
+
+def mel_to_json(mel: MelConfig) -> dict[str, Any]:
+    """Settings of the audio features as JSON values."""
+    return asdict(mel)

@@ -1,0 +1,29 @@
+"""One recording: speech, the motion made with it, and what is known about both."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.words import Word as Word
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Speech audio with its motion; both start at time zero."""
+
+    name: str
+    """Unique within a corpus."""
+    audio: Float[np.ndarray, " N"]
+    """Mono samples in -1 to 1."""
+    sample_rate: int
+    motion: Motion
+    words: tuple[Word, ...] = ()
+    speaker: str = ""
+    emotion: str = ""
+    sources: tuple[str, ...] = ()
+    """Files it was read from; empty for a generated one."""
+    annotations: dict[str, Any] = field(default_factory=dict)
+    """Anything else that is known, as JSON-able values."""

@@ -1,0 +1,227 @@
+"""From drawn strokes to the control track of each arm: preparation, stroke, hold, retraction, rest."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from a2g_jax.data.talker.gesture_plan import LONG_PAUSE, GestureDraws
+from a2g_jax.data.talker.hand_shapes import Control, rest_control, stroke_controls
+from a2g_jax.data.talker.paths import Track
+from a2g_jax.data.talker.speech import SpeechPlan
+from a2g_jax.data.talker.styles import GestureStyle
+from a2g_jax.data.talker.truth import PhaseSpan, Stroke
+
+ARRIVAL = 0.82
+"""Share of a stroke's minimum-jerk step that has passed at the apex: 96 % of the way is done."""
+
+_BLEND = 0.09
+"""A preparation ends this long after its stroke began, seconds: the hand turns in a curve and does not stop."""
+_MIRROR_LAG = 0.06
+"""The second hand follows by up to this much, seconds."""
+
+
+@dataclass(frozen=True)
+class StrokeTiming:
+    """When one hand makes one stroke; seconds."""
+
+    begin: float
+    end: float
+
+
+@dataclass
+class _Arm:
+    """One arm being planned: where it is led to, and since when it has been free."""
+
+    hand: str
+    rest: Control
+    track: Track
+    free: float
+    spans: list[PhaseSpan]
+    resting: bool = True
+
+    def mark(self, phase: str, begin: float, end: float) -> None:
+        if end > begin:
+            self.spans.append(PhaseSpan(begin, end, phase, self.hand))
+
+
+def plan_arms(
+    plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng: np.random.Generator
+) -> tuple[dict[str, Track], tuple[PhaseSpan, ...]]:
+    """Control tracks of the left and right arm (see :mod:`a2g_jax.data.talker.hand_shapes`) and their phases."""
+    dominant = "right" if style.right_handed >= 0.5 else "left"
+    arms = {}
+    for hand in ("left", "right"):
+        rest = rest_control(draws.rest_pose, hand == dominant)
+        arms[hand] = _Arm(hand, rest, Track(rest), 0.0, [])
+    for number, unit in enumerate(draws.units):
+        strokes = [draws.strokes[index] for index in unit.strokes]
+        hands = ("left", "right") if unit.hand == "both" else (unit.hand,)
+        lead = dominant if unit.hand == "both" else unit.hand
+        timings = [_stroke_timing(stroke, strokes, style, rng) for stroke in strokes]
+        shapes = [
+            stroke_controls(unit.family, unit.place, unit.hand == "both", order, len(strokes), stroke.size, style, rng)
+            for order, stroke in enumerate(strokes)
+        ]
+        for hand in ("left", "right"):
+            arm = arms[hand]
+            follow = _next_stroke(draws, number, hand)
+            if hand not in hands:
+                _sympathise(arm, strokes, style, rng)
+            elif hand == lead:
+                _gesture(arm, plan, strokes, timings, shapes, follow, unit.holds, style, rng)
+            else:
+                lag = rng.uniform(-0.01, _MIRROR_LAG)
+                late = [StrokeTiming(timing.begin + lag, timing.end + lag) for timing in timings]
+                mirrored = [_second_hand(shape, style, rng) for shape in shapes]
+                _gesture(arm, plan, strokes, late, mirrored, follow, unit.holds, style, rng)
+    for arm in arms.values():
+        arm.mark("rest", arm.free, plan.seconds)
+    spans = sorted((span for arm in arms.values() for span in arm.spans), key=lambda span: (span.hand, span.start))
+    return {hand: arm.track for hand, arm in arms.items()}, tuple(spans)
+
+
+def _next_stroke(draws: GestureDraws, number: int, hand: str) -> Stroke | None:
+    """The first stroke of the next unit after ``number`` that uses ``hand``."""
+    for unit in draws.units[number + 1 :]:
+        if unit.hand in (hand, "both"):
+            return draws.strokes[unit.strokes[0]]
+    return None
+
+
+def _stroke_timing(
+    stroke: Stroke, strokes: list[Stroke], style: GestureStyle, rng: np.random.Generator
+) -> StrokeTiming:
+    # Larger strokes take a little longer (isochrony), tight sequences force shorter ones.
+    gaps = [abs(other.apex - stroke.apex) for other in strokes if other is not stroke]
+    length = (0.27 + 0.30 * style.radius * (0.35 + 0.90 * stroke.size)) / style.speed * rng.uniform(0.9, 1.1)
+    length = float(np.clip(min(length, 0.62 * min(gaps, default=1.0)), 0.18, 0.36))
+    begin = stroke.apex - ARRIVAL * length
+    return StrokeTiming(begin, begin + length)
+
+
+def _second_hand(
+    shape: tuple[Control, Control, Control], style: GestureStyle, rng: np.random.Generator
+) -> tuple[Control, Control, Control]:
+    """The same stroke for the other hand: a little smaller, and never an exact mirror image."""
+    ready, apex, bow = shape
+    middle = 0.5 * (ready + apex)
+    share = style.symmetry * rng.uniform(0.65, 1.1)
+    wobble = np.concatenate([rng.normal(0.0, 0.020, 3), rng.normal(0.0, 0.10, 3), np.zeros(3)])
+    shift = middle + wobble
+    return shift + share * (ready - middle), shift + share * (apex - middle), share * bow
+
+
+def _sympathise(arm: _Arm, strokes: list[Stroke], style: GestureStyle, rng: np.random.Generator) -> None:
+    """The idle hand stirs a little with the other hand's strokes."""
+    for stroke in strokes:
+        height = np.zeros(len(arm.rest))
+        size = style.radius * stroke.size * rng.uniform(0.05, 0.25)
+        height[:3] = size * np.array([0.1, 0.6, 0.5])
+        height[4] = rng.normal(0.0, 0.03)
+        arm.track.add_pulse(height, stroke.apex - 0.32, stroke.apex + 0.05, stroke.apex + 0.6)
+
+
+def _gesture(
+    arm: _Arm,
+    plan: SpeechPlan,
+    strokes: list[Stroke],
+    timings: list[StrokeTiming],
+    shapes: Sequence[tuple[Control, Control, Control]],
+    follow: Stroke | None,
+    holds: bool,
+    style: GestureStyle,
+    rng: np.random.Generator,
+) -> None:
+    """One gesture unit of one arm."""
+    tempo = style.speed
+    for order, (timing, (ready, apex, bow)) in enumerate(zip(timings, shapes, strict=True)):
+        if order == 0:
+            want = rng.uniform(0.50, 0.72) / tempo
+            begin = max(timing.begin - want, min(arm.free - 0.15, timing.begin - 0.22))
+            arm.mark("rest", arm.free, begin)
+            arm.mark("preparation", max(begin, arm.free), timing.begin)
+        else:
+            begin = _between(arm, timings[order - 1], timing, strokes[order - 1], holds, style, rng)
+        arm.track.step_to(ready, begin, timing.begin + _BLEND)
+        arm.track.step_to(apex, timing.begin, timing.end)
+        arm.track.add_bump(bow, timing.begin, timing.end)
+        arm.mark("stroke", timing.begin, timing.end)
+        arm.free = timing.end
+    _retract(arm, plan, strokes[-1], timings[-1], follow, style, rng)
+
+
+def _between(
+    arm: _Arm,
+    before: StrokeTiming,
+    timing: StrokeTiming,
+    stroke: Stroke,
+    holds: bool,
+    style: GestureStyle,
+    rng: np.random.Generator,
+) -> float:
+    """What the hand does between two strokes of a unit; returns when the next preparation begins."""
+    gap = timing.begin - before.end
+    prepare = min(rng.uniform(0.32, 0.5) / style.speed, max(gap + 0.08, 0.16))
+    begin = timing.begin - prepare
+    release = before.end + (stroke.hold if holds else 0.0) - 0.05
+    if timing.begin - release < 0.5:
+        middle = max(begin, before.end)
+        arm.mark("hold", before.end, middle)
+        arm.mark("preparation", middle, timing.begin)
+        return begin
+    # The hand sinks back and closes a little, as if the effort had left it.
+    relax = arm.track.goal.copy()
+    ease = (1.0 - 0.6 * min(style.tension, 1.0)) * rng.uniform(0.18, 0.42)
+    relax[:6] += ease * (arm.rest - arm.track.goal)[:6]
+    end = release + rng.uniform(0.45, 0.65) / style.speed
+    arm.track.step_to(relax, release, end)
+    let_go, middle = max(release, before.end), max(min(end, begin), before.end)
+    arm.mark("hold", before.end, let_go)
+    arm.mark("retraction", let_go, middle)
+    arm.mark("preparation", max(middle, let_go), timing.begin)
+    return begin
+
+
+def _retract(
+    arm: _Arm,
+    plan: SpeechPlan,
+    stroke: Stroke,
+    timing: StrokeTiming,
+    follow: Stroke | None,
+    style: GestureStyle,
+    rng: np.random.Generator,
+) -> None:
+    """Hold, then lead the arm back to rest; part of the way where the next unit follows soon."""
+    length = rng.uniform(0.70, 1.05) / style.speed
+    begin = timing.end + stroke.hold - 0.04
+    pause = _next_pause(plan, stroke.apex)
+    if pause is not None:
+        begin = max(min(begin, pause + 0.1), timing.end - 0.04)
+    share = 1.0
+    if follow is not None:
+        # The next stroke's preparation wants about 0.7 s.
+        room = follow.apex - 0.75 - begin
+        if room < length:
+            begin = max(min(begin, follow.apex - 1.0), timing.end - 0.04)
+            share = float(np.clip((follow.apex - 0.6 - begin) / (length + 0.25), 0.10, 1.0)) ** 1.5
+            length = float(np.clip(follow.apex - 0.6 - begin, 0.45, length))
+    goal = arm.track.goal + share * (arm.rest - arm.track.goal)
+    arm.track.step_to(goal, begin, begin + length)
+    bow = np.zeros(len(goal))
+    bow[0] = 0.025 * share
+    arm.track.add_bump(bow, begin, begin + length)
+    arm.mark("hold", timing.end, begin)
+    arm.mark("retraction", max(begin, timing.end), begin + length)
+    arm.free = begin + length
+
+
+def _next_pause(plan: SpeechPlan, after: float) -> float | None:
+    """Start of the long pause that follows the phrase spoken at ``after``, if one does."""
+    for index, phrase in enumerate(plan.phrases):
+        if phrase.end >= after:
+            last = index + 1 == len(plan.phrases)
+            if last or plan.phrases[index + 1].start - phrase.end > LONG_PAUSE:
+                return phrase.end
+            return None
+    return None

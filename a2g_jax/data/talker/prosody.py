@@ -1,0 +1,159 @@
+"""Melody and loudness of a plan.
+
+F0 follows the command-response model of Fujisaki & Hirose 1984:
+
+    ln F0(t) = ln Fb + sum_i Ap_i Gp(t - T0_i) + sum_j Aa_j (Ga(t - T1_j) - Ga(t - T2_j))
+    Gp(t) = alpha^2 t exp(-alpha t)                       for t >= 0, else 0
+    Ga(t) = min(1 - (1 + beta t) exp(-beta t), gamma)     for t >= 0, else 0
+
+with alpha = 3 /s, beta = 20 /s and gamma = 0.9. Energy is a contour in dB that peaks at each syllable's peak; accents
+raise it, as they raise F0 and duration.
+"""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import fftconvolve
+
+from a2g_jax.data.talker.emotions import VoiceEmotion
+from a2g_jax.data.talker.phones import PHONES, SILENT
+from a2g_jax.data.talker.plan import phone_spans
+from a2g_jax.data.talker.speakers import VoiceStyle
+from a2g_jax.data.talker.speech import SpeechPlan
+
+ALPHA, BETA, GAMMA = 3.0, 20.0, 0.9
+ACCENT_DB = (0.5, 8.0)
+"""Energy an accent adds, dB: ``ACCENT_DB[0] + ACCENT_DB[1] * accent`` for accents above zero."""
+
+_NEPER_PER_SEMITONE = math.log(2.0) / 12.0
+_WANDER = 0.08  # of the range: what no command explains
+_PHRASE_LEAD = 0.25  # seconds by which a phrase command precedes the phrase
+
+
+def phrase_response(t: Float[np.ndarray, " *T"]) -> Float[np.ndarray, " *T"]:
+    """Gp of the model; t in seconds, result in 1/s."""
+    t = np.maximum(t, 0.0)
+    return ALPHA**2 * t * np.exp(-ALPHA * t)
+
+
+def accent_response(t: Float[np.ndarray, " *T"]) -> Float[np.ndarray, " *T"]:
+    """Ga of the model; t in seconds, result between 0 and gamma."""
+    t = np.maximum(t, 0.0)
+    return np.minimum(1.0 - (1.0 + BETA * t) * np.exp(-BETA * t), GAMMA)
+
+
+def _between(times: Float[np.ndarray, " T"], start: float, end: float) -> slice:
+    """The part of increasing ``times`` that lies between two moments."""
+    low, high = np.searchsorted(times, (start, end))
+    return slice(int(low), int(high))
+
+
+def _phrase_curve(
+    plan: SpeechPlan, reach: float, times: Float[np.ndarray, " T"], rng: np.random.Generator
+) -> Float[np.ndarray, " T"]:
+    """Phrase components of ln F0, with the final fall or rise of each phrase."""
+    curve = np.zeros(len(times))
+    for phrase in plan.phrases:
+        size = 0.75 * reach * math.exp(0.15 * rng.standard_normal())
+        commands = [(phrase.start - _PHRASE_LEAD, size)]
+        if phrase.end - phrase.start > 2.2:
+            # A second, smaller command keeps long phrases from falling to the floor half way.
+            commands.append((phrase.start + 1.4, 0.5 * size))
+        for moment, height in commands:
+            part = _between(times, moment, moment + 4.0)
+            curve[part] += height * phrase_response(times[part] - moment)
+        # Final lowering; one phrase in five rises instead, as questions and continuations do.
+        turn = -0.30 * reach if rng.random() < 0.8 else 0.45 * reach
+        part = _between(times, phrase.end - 0.35, phrase.end)
+        curve[part] += turn * ((times[part] - phrase.end + 0.35) / 0.35) ** 2
+    return curve
+
+
+def _accent_curve(
+    plan: SpeechPlan, reach: float, times: Float[np.ndarray, " T"], rng: np.random.Generator
+) -> Float[np.ndarray, " T"]:
+    """Accent components of ln F0: large on accented syllables, small on merely stressed ones."""
+    curve = np.zeros(len(times))
+    for syllable in plan.syllables:
+        strength = syllable.accent if syllable.accent > 0 else 0.2 * syllable.stress * rng.random()
+        if strength == 0.0:
+            continue
+        size = (0.12 + 0.8 * strength) * reach
+        rise = syllable.peak - 0.11 + 0.015 * rng.standard_normal()
+        fall = max(syllable.peak + 0.05, syllable.end - 0.08) + 0.015 * rng.standard_normal()
+        part = _between(times, rise, fall + 0.5)
+        curve[part] += size * (accent_response(times[part] - rise) - accent_response(times[part] - fall))
+    return curve
+
+
+def _consonant_curve(plan: SpeechPlan, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
+    """Vowels start higher after voiceless obstruents and lower after voiced ones (Hombert, Ohala & Ewan 1979)."""
+    curve = np.zeros(len(times))
+    for syllable in plan.syllables:
+        first = PHONES[syllable.phones[0]]
+        if first.kind in ("vowel", "nasal", "approximant"):
+            continue
+        start = next(begin for symbol, begin, _ in phone_spans(syllable) if PHONES[symbol].is_vowel)
+        step = 0.05 if first.voiced_db <= SILENT else -0.04
+        part = _between(times, start - 0.03, start + 0.15)
+        curve[part] += step * np.exp(-np.abs(times[part] - start) / 0.035)
+    return curve
+
+
+def _slow_noise(count: int, step: float, rng: np.random.Generator) -> Float[np.ndarray, " T"]:
+    """Noise of unit variance that changes within about 0.3 s; ``step`` is its sample spacing in seconds."""
+    window = np.hanning(max(3, int(0.6 / step)))
+    knots = rng.standard_normal(count + len(window) - 1)
+    return fftconvolve(knots, window / np.sqrt(np.sum(window**2)), mode="valid")
+
+
+def pitch_contour(
+    plan: SpeechPlan,
+    style: VoiceStyle,
+    emotion: VoiceEmotion,
+    times: Float[np.ndarray, " T"],
+    rng: np.random.Generator,
+) -> Float[np.ndarray, " T"]:
+    """F0 in Hz at evenly spaced times (seconds). Its median over speech is the speaker's, moved by emotion."""
+    reach = style.f0_range_semitones * emotion.f0_range_factor * _NEPER_PER_SEMITONE
+    log_f0 = _phrase_curve(plan, reach, times, rng) + _accent_curve(plan, reach, times, rng)
+    log_f0 += _consonant_curve(plan, times)
+    log_f0 += _WANDER * reach * _slow_noise(len(times), float(times[1] - times[0]), rng)
+    spoken = np.zeros(len(times), bool)
+    for phrase in plan.phrases:
+        spoken[_between(times, phrase.start, phrase.end)] = True
+    base = math.log(style.median_f0_hz) + emotion.f0_shift_semitones * _NEPER_PER_SEMITONE
+    if spoken.any():
+        log_f0 -= np.median(log_f0[spoken])
+    # Even excited voices seldom leave the octave above their median: bend what lies beyond 10 semitones.
+    knee = 10.0 * _NEPER_PER_SEMITONE
+    log_f0 = np.where(log_f0 > knee, knee + 0.3 * np.tanh((log_f0 - knee) / 0.3), log_f0) + base
+    # Slow wander that no command explains: "flutter" as three incommensurate sinusoids (Klatt & Klatt 1990).
+    for rate in (12.7, 7.1, 4.7):
+        log_f0 += 0.002 * emotion.jitter_factor * np.sin(2.0 * math.pi * (rate * times + rng.random()))
+    return np.exp(log_f0)
+
+
+def energy_contour(plan: SpeechPlan, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
+    """Level in dB relative to an unaccented stressed vowel, at the given times; peaks at every syllable's peak."""
+    peaks = [syllable.peak for syllable in plan.syllables]
+    level = np.interp(times, peaks, [0.0 if syllable.stress else -1.2 for syllable in plan.syllables])
+    for phrase in plan.phrases:
+        part = _between(times, phrase.start, phrase.end)
+        level[part] += 1.5 - 3.0 * (times[part] - phrase.start) / (phrase.end - phrase.start)
+        part = _between(times, phrase.end - 0.2, phrase.end)
+        level[part] -= 6.0 * ((times[part] - phrase.end + 0.2) / 0.2) ** 2
+    for syllable in plan.syllables:
+        peak = syllable.peak
+        # Every syllable is a hill of its own.
+        half = max(peak - syllable.onset, syllable.end - peak)
+        part = _between(times, syllable.onset, syllable.end)
+        level[part] -= 8.0 * np.minimum(((times[part] - peak) / half) ** 2, 1.0)
+        if syllable.accent > 0.0:
+            rise, fall = 0.055, max(0.065, 0.4 * (syllable.end - peak))
+            part = _between(times, peak - 4.0 * rise, peak + 4.0 * fall)
+            away = times[part] - peak
+            boost = ACCENT_DB[0] + ACCENT_DB[1] * syllable.accent
+            level[part] += boost * np.exp(-0.5 * (away / np.where(away < 0.0, rise, fall)) ** 2)
+    return level

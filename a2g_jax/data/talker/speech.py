@@ -1,0 +1,59 @@
+"""What is said: the plan that both the voice and the gestures of the generated corpus follow.
+
+The plan is everything that audio determines. The voice renders it; gestures take their timing and strength from it,
+and draw everything else (see :mod:`a2g_jax.data.talker.truth`) from their own key.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Syllable:
+    """One syllable of the plan; times in seconds from the start of the recording."""
+
+    onset: float
+    """Where its first consonant starts (or its vowel, if it has none)."""
+    peak: float
+    """Where its energy is largest: the moment gestures are timed against."""
+    end: float
+    phones: tuple[str, ...]
+    stress: int
+    """0 unstressed, 1 lexically stressed."""
+    accent: float
+    """Prominence of its pitch accent, 0 (none) to 1 (emphatic): decides whether a stroke falls here, and how large."""
+    word: int
+    """Index into :attr:`SpeechPlan.words`."""
+
+
+@dataclass(frozen=True)
+class PlannedWord:
+    """One word of the invented language; times in seconds."""
+
+    text: str
+    start: float
+    end: float
+    phrase: int
+    """Index into :attr:`SpeechPlan.phrases`."""
+
+
+@dataclass(frozen=True)
+class Phrase:
+    """One breath group: speech without a pause in it; times in seconds."""
+
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class SpeechPlan:
+    """A whole recording's speech."""
+
+    seconds: float
+    """Length of the audio, silence at both ends included."""
+    speaker: str
+    """Name of a speaker in :mod:`a2g_jax.data.talker.speakers`."""
+    emotion: str
+    """Name of an emotion in :mod:`a2g_jax.data.talker.emotions`."""
+    phrases: tuple[Phrase, ...]
+    words: tuple[PlannedWord, ...]
+    syllables: tuple[Syllable, ...]

@@ -1,0 +1,9 @@
+"""The errors this package raises for what users hand it."""
+
+
+class A2GError(Exception):
+    """Base of the package's own errors; the command line prints one as a single line and exits with status 2."""
+
+
+class InputError(A2GError, ValueError):
+    """A file or value that cannot be used: the message names it, the place in it and the mend."""

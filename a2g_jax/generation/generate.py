@@ -1,0 +1,107 @@
+"""Motions for a speech of any length, from a trained run."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import log_mel
+from a2g_jax.generation.root import plant_feet
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.nn.noise import BLOCK
+from a2g_jax.training.run import Run
+
+#: Frames that one call of a compiled function gives. One size for every audio: nothing compiles anew for a new length.
+WINDOW = 1024
+
+
+class Generator:
+    """A run ready to generate; compiles on first use and serves any audio after that.
+
+    Audio is worked on in windows with as much context on either side as an output frame can depend on, so the motion is
+    the same as from one pass over the whole audio. Before the first and after the last frame the model hears silence.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+        model = run.config.build()
+        self._halo = -(-model.halo // BLOCK) * BLOCK
+        self._params = jax.device_put(run.params)
+        self._summary = jax.device_put(run.summary)
+        self._condition = jax.jit(model.condition)
+
+        @jax.jit
+        def sample(params, summary, key, condition, start):
+            pose = model.sample(params, summary, key, condition, start)
+            return matrix_from_6d(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW))
+
+        self._sample = sample
+
+    def frames(self, audio: Float[np.ndarray, " N"]) -> int:
+        """Length of the motion for an audio: its seconds times fps, rounded."""
+        return round(len(audio) / self.run.config.mel.sample_rate * self.run.config.fps)
+
+    def generate(
+        self,
+        audio: Float[np.ndarray, " N"],
+        samples: int,
+        seed: int = 0,
+        report: Callable[[int], None] = lambda done: None,
+    ) -> list[Motion]:
+        """Different motions for the same speech.
+
+        Sample k depends on the audio, the run, the seed and k alone, not on how many samples are asked for.
+
+        Args:
+            audio: mono, at the run's sample rate.
+            samples: how many.
+            seed: of all that is drawn.
+            report: called with the number of samples done.
+
+        Raises:
+            InputError: the audio is shorter than a frame.
+        """
+        motions = []
+        for number, motion in enumerate(self.stream(audio, samples, seed), start=1):
+            motions.append(motion)
+            report(number)
+        return motions
+
+    def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
+        """:meth:`generate`, one motion at a time."""
+        frames = self.frames(audio)
+        if frames == 0:
+            raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
+        windows = list(self._windows(audio, frames))
+        key = jax.random.key(seed)
+        for number in range(samples):
+            draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
+            parts = [draw(condition, jnp.int32(start)) for start, condition in windows]
+            rotations = np.concatenate([np.asarray(part) for part in parts])[:frames]
+            yield self._motion(rotations)
+
+    def _windows(self, audio: Float[np.ndarray, " N"], frames: int):
+        """First frame (context included) and encoded audio of each window."""
+        config = self.run.config
+        features = log_mel(audio, config.mel, config.fps, frames)
+        count = -(-frames // WINDOW)
+        after = count * WINDOW - frames + self._halo
+        # The quietest value is what silence looks like after the features' floor.
+        padded = np.pad(features, ((self._halo, after), (0, 0)), constant_values=float(features.min()))
+        normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)
+        for start in range(0, count * WINDOW, WINDOW):
+            window = normalised[start : start + WINDOW + 2 * self._halo]
+            yield start - self._halo, self._condition(self._params, window)
+
+    def _motion(self, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
+        config = self.run.config
+        return plant_feet(
+            Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps),
+            np.asarray(config.statistics["root"].mean),
+            np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean))),
+        )

@@ -1,0 +1,59 @@
+"""Forward kinematics: local joint rotations to joint positions (Audio2Gestures, Eq. 5)."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from a2g_jax.geometry.skeleton import tree_levels
+
+
+def global_rotations(rotations: Float[Array, "J 3 3"], parents: tuple[int, ...]) -> Float[Array, "J 3 3"]:
+    """Orientation of every joint in the world, of one frame: ``R_world = R_world_parent @ R_local``."""
+    return _chain(rotations, None, parents)[0]
+
+
+def forward_kinematics(
+    rotations: Float[Array, "J 3 3"], offsets: Float[Array, "J 3"], parents: tuple[int, ...]
+) -> Float[Array, "J 3"]:
+    """Joint positions of one frame in metres, with the root joint at the origin.
+
+    One gather and one batched 3x3 product for each level of the tree: the formulation that XLA runs fastest on
+    CPU, forward and backward (4x4 homogeneous matrices are twenty times slower). vmap it over frames.
+
+    Args:
+        rotations: local rotation matrices, parent from joint.
+        offsets: bone vectors in the parent's frame, metres; row 0 is ignored.
+        parents: the tree; static.
+    """
+    return _chain(rotations, offsets, parents)[1]
+
+
+def _chain(rotations, offsets, parents):
+    levels = tree_levels(parents)
+    world = rotations[np.array(levels[0])]
+    place = jnp.zeros((1, 3), rotations.dtype)
+    worlds, places = [world], [place]
+    for above, level in zip(levels, levels[1:], strict=False):
+        joints = np.array(level)
+        rows = np.array([above.index(parents[joint]) for joint in level])
+        parent_world = world[rows]
+        if offsets is not None:
+            place = place[rows] + (parent_world @ offsets[joints][:, :, None])[:, :, 0]
+            places.append(place)
+        world = parent_world @ rotations[joints]
+        worlds.append(world)
+    # Levels concatenate to a permutation of the joints; undo it with one gather.
+    order = np.argsort(np.concatenate([np.array(level) for level in levels]))
+    positions = jnp.concatenate(places)[order] if offsets is not None else None
+    return jnp.concatenate(worlds)[order], positions
+
+
+def joint_positions(
+    rotations: Float[Array, "*batch J 3 3"], offsets: Float[Array, "J 3"], parents: tuple[int, ...]
+) -> Float[Array, "*batch J 3"]:
+    """:func:`forward_kinematics` over any leading axes (time, clips, samples), root at the origin."""
+    batch = rotations.shape[:-3]
+    flat = rotations.reshape((-1, *rotations.shape[-3:]))
+    positions = jax.vmap(lambda frame: forward_kinematics(frame, offsets, parents))(flat)
+    return positions.reshape((*batch, *positions.shape[1:]))

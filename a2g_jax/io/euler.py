@@ -1,0 +1,53 @@
+"""Euler angles that run on smoothly over time."""
+
+import numpy as np
+from jaxtyping import Float
+
+#: Below this cosine of the middle angle the first angle is lost in the rounding of float32 rotations.
+_LOCK = 1e-6
+
+
+def continuous_euler(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.ndarray, "T J 3"]:
+    """Intrinsic Euler angles in degrees whose every frame lies as near as can be to the one before.
+
+    ``order`` is a permutation of ``XYZ``; ``"ZXY"`` gives angles with ``R = Rz @ Rx @ Ry``. Every rotation has two
+    triples, ``(a, b, c)`` and ``(a + 180, 180 - b, c + 180)``, each up to whole turns. Frame 0 takes the triple whose
+    middle angle is within 90 degrees, every later frame the one nearest to its predecessor's.
+    """
+    first = _triples(np.asarray(rotations, np.float64), order)
+    second = np.stack([first[..., 0] + 180, 180 - first[..., 1], first[..., 2] + 180], axis=-1)
+    result = np.empty_like(first)
+    result[0] = last = first[0]
+    for frame in range(1, len(first)):
+        near = first[frame] + 360 * np.round((last - first[frame]) / 360)
+        other = second[frame] + 360 * np.round((last - second[frame]) / 360)
+        nearer = np.abs(other - last).sum(axis=-1) < np.abs(near - last).sum(axis=-1)
+        result[frame] = last = np.where(nearer[:, None], other, near)
+    return result
+
+
+def _triples(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.ndarray, "T J 3"]:
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    # From R = Ri(a) Rj(b) Rk(c): row i is (cos b cos c, -sign cos b sin c, sign sin b) in columns i, j, k, and column
+    # k is (sign sin b, -sign sin a cos b, cos a cos b) in rows i, j, k.
+    width = np.hypot(rotations[..., i, i], rotations[..., i, j])
+    first = np.arctan2(-sign * rotations[..., j, k], rotations[..., k, k])
+    first = _hold(first, width > _LOCK)
+    middle = np.arctan2(sign * rotations[..., i, k], width)
+    # The last angle from Ri(a)^T R = Rj(b) Rk(c), whose row j is (sign sin c, cos c) in columns i, j. That stays
+    # accurate near gimbal lock, where it makes up for whatever the first angle is.
+    cosine, sine = np.cos(first), sign * np.sin(first)
+    row_i = cosine * rotations[..., j, i] + sine * rotations[..., k, i]
+    row_j = cosine * rotations[..., j, j] + sine * rotations[..., k, j]
+    last = np.arctan2(sign * row_i, row_j)
+    return np.degrees(np.stack([first, middle, last], axis=-1))
+
+
+def _hold(angles: Float[np.ndarray, "T J"], known) -> Float[np.ndarray, "T J"]:
+    # Where an angle is unknown, that of the last frame that knows it; before the first such frame, the first known.
+    frames = np.arange(len(angles))[:, None]
+    source = np.maximum.accumulate(np.where(known, frames, -1), axis=0)
+    source = np.where(source < 0, np.argmax(known, axis=0)[None], source)
+    held = np.take_along_axis(angles, source, axis=0)
+    return np.where(known.any(axis=0)[None], held, 0.0)

@@ -1,0 +1,138 @@
+"""Reading and writing files safely: errors in one line, and nothing half-written."""
+
+import hashlib
+import json
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.errors import InputError
+
+
+def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
+    """The path of an ordinary file with something in it.
+
+    Args:
+        kind: what the file should be, with its article, for the messages: ``"a BVH file"``.
+
+    Raises:
+        InputError: there is no such file, it may not be read, it is a folder or a device, or it is empty.
+    """
+    path = Path(path)
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"{path}: is a folder; name {kind} in it.")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path}: is not an ordinary file; save {kind} to disk first.")
+        with path.open("rb"):
+            pass
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file; check the path.") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path and its permissions.") from None
+    except ValueError as error:  # a null character in the path
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{str(path)!r}: is not a usable path; check its characters.") from None
+    if status.st_size == 0:
+        raise InputError(f"{path}: is empty (0 bytes); expected {kind}.")
+    return path
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Write a file completely or not at all.
+
+    Yields a temporary path in the same folder with the same suffix. When the block ends well, that file takes the
+    place of ``path``; when it raises, it is removed and ``path`` stays as it was. Missing folders are made.
+
+    Raises:
+        InputError: the folder cannot be made or written to, or ``path`` is a folder or a device.
+    """
+    path = Path(path)
+    # A link is followed, so that the file it points at is replaced and not the link.
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it.")
+    # Renaming over a device such as /dev/null would replace the device.
+    if target.exists() and not target.is_file():
+        raise InputError(f"{path}: is not an ordinary file; write to another path.")
+    temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(6)}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            yield temporary
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        if error.filename not in (None, str(temporary), str(target), str(target.parent)):
+            raise
+        raise InputError(
+            f"{path}: cannot be written ({error.strerror or error}); check the folder, its permissions and free space."
+        ) from error
+
+
+def sha256_file(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file's bytes, as 64 hexadecimal digits."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path.") from None
+
+
+def write_json(path: str | os.PathLike[str], value: Any) -> None:
+    """Write ``value`` as indented UTF-8 JSON, atomically.
+
+    NumPy scalars and arrays and paths are written as what they hold; NaN and infinities raise ``ValueError``, because
+    JSON has none.
+    """
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"Expected a value that JSON can hold; got {type(value).__name__}.")
+
+
+def read_json(path: str | os.PathLike[str]) -> Any:
+    """Read a JSON file.
+
+    Raises:
+        InputError: no such file, not UTF-8, or not JSON (with the line and column); NaN and infinities count as
+            broken.
+    """
+    path = check_readable(path, "a JSON file")
+
+    def refuse(name: str) -> None:
+        raise InputError(f"{path}: holds {name}, which is not JSON; replace it by null or a number.")
+
+    try:
+        return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=refuse)
+    except InputError:
+        raise
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start}); expected a JSON file.") from None
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path}, line {error.lineno}, column {error.colno}: is not JSON ({error.msg}); correct it there."
+        ) from None
+    except RecursionError:
+        raise InputError(f"{path}: is nested too deeply; expected a flatter JSON file.") from None
+    except (ValueError, OSError) as error:  # such as an integer of thousands of digits
+        raise InputError(f"{path}: cannot be read as JSON ({error}).") from None

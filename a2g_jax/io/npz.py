@@ -1,0 +1,166 @@
+"""Motions as NumPy archives: the form to read from Python without this package."""
+
+import lzma
+import math
+import os
+import struct
+import tokenize
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.files import atomic_path, check_readable
+
+#: Largest array that is read, in bytes, and longest array header.
+_LARGEST = 8 * 2**30
+_LONGEST_HEADER = 65_536
+# What zipfile, its decompressors and numpy.lib.format raise on damaged bytes.
+_DAMAGE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, tokenize.TokenError, struct.error, ArithmeticError, EOFError,
+    IndexError, KeyError, MemoryError, OSError, RuntimeError, SyntaxError, TypeError, ValueError,
+)  # fmt: skip
+
+
+def write_motion_npz(path: str | os.PathLike[str], motion: Motion) -> None:
+    """Write a motion as a compressed ``.npz`` archive, atomically.
+
+    ======================  ============  ==================================================
+    key                     shape         what
+    ======================  ============  ==================================================
+    ``rotations``           (T, J, 3, 3)  local rotation matrices, parent from joint
+    ``root``                (T, 3)        world position of joint 0, metres
+    ``positions``           (T, J, 3)     world positions of all joints, metres; not read back
+    ``fps``                 ()            frames a second
+    ``joint_names``         (J,)          text
+    ``parents``             (J,)          index of each joint's parent, -1 for the root
+    ``offsets``             (J, 3)        bones at rest in the parent's frame, metres
+    ``end_joints``          (E,)          joints that carry an end site
+    ``end_offsets``         (E, 3)        end sites in their joint's frame, metres
+    ======================  ============  ==================================================
+
+    Raises:
+        InputError: the suffix is another, or the motion holds NaN or infinities.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".npz":
+        raise InputError(f"{path}: not written: the suffix must be .npz.")
+    skeleton = motion.skeleton
+    arrays: dict[str, Any] = {
+        "rotations": np.asarray(motion.rotations, np.float32),
+        "root": np.asarray(motion.root, np.float32),
+        "positions": np.asarray(motion.positions(), np.float32),
+        "fps": np.asarray(motion.fps, np.float64),
+        "joint_names": np.array(skeleton.names, np.str_),
+        "parents": np.array(skeleton.parents, np.int32),
+        "offsets": np.asarray(skeleton.offsets, np.float32),
+        "end_joints": np.array([joint for joint, _ in skeleton.ends], np.int32),
+        "end_offsets": np.array([end for _, end in skeleton.ends], np.float64).reshape(-1, 3),
+    }
+    for key, array in arrays.items():
+        if array.dtype.kind == "f" and not np.all(np.isfinite(array)):
+            raise InputError(f"{path}: not written: NaN or infinity in {key}.")
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, **arrays)
+
+
+def read_motion_npz(path: str | os.PathLike[str]) -> Motion:
+    """Read what :func:`write_motion_npz` wrote; ``end_joints`` and ``end_offsets`` may be missing.
+
+    Raises:
+        InputError: no such file, not an archive, damaged, or an array is missing or of the wrong shape or type.
+    """
+    path = check_readable(path, "an .npz motion")
+    try:
+        archive = zipfile.ZipFile(path)
+    except _DAMAGE:
+        raise InputError(f"{path}: is not an .npz archive, or is damaged; write it again.") from None
+    with archive:
+        rotations = _floats(path, archive, "rotations", (None, None, 3, 3))
+        frames, joints = rotations.shape[:2]
+        root = _floats(path, archive, "root", (frames, 3))
+        offsets = _floats(path, archive, "offsets", (joints, 3))
+        names = _array(path, archive, "joint_names", "U", (joints,))
+        parents = _array(path, archive, "parents", "iu", (joints,))
+        fps = float(_array(path, archive, "fps", "fiu", ()))
+        ends: tuple[tuple[int, tuple[float, float, float]], ...] = ()
+        if "end_joints.npy" in archive.namelist():
+            owners = _array(path, archive, "end_joints", "iu", (None,)).tolist()
+            tips = _floats(path, archive, "end_offsets", (len(owners), 3), np.float64).tolist()
+            ends = tuple((owner, (x, y, z)) for owner, (x, y, z) in zip(owners, tips, strict=True))
+            if any(not 0 <= owner < joints for owner in owners):
+                raise InputError(f"{path}: end_joints: expected numbers from 0 to {joints - 1}; write it again.")
+    if frames == 0:
+        raise InputError(f"{path}: rotations: expected at least one frame; got none.")
+    if not (math.isfinite(fps) and fps > 0):
+        raise InputError(f"{path}: fps: expected a positive number; got {fps}.")
+    try:
+        skeleton = Skeleton(
+            offsets=offsets,
+            names=tuple(str(name) for name in names),
+            parents=tuple(int(parent) for parent in parents),
+            ends=ends,
+        )
+    except ValueError as error:
+        raise InputError(f"{path}: joint_names, parents: {' '.join(str(error).split())}") from None
+    return Motion(rotations=rotations, root=root, skeleton=skeleton, fps=fps)
+
+
+def _floats(
+    path: Path, archive: zipfile.ZipFile, key: str, shape: tuple[int | None, ...], dtype: type = np.float32
+) -> np.ndarray:
+    array = _array(path, archive, key, "f", shape)
+    with np.errstate(over="ignore"):  # what float32 cannot hold is found below
+        array = array.astype(dtype)
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        place = ", ".join(str(int(index)) for index in bad[0])
+        raise InputError(f"{path}: {key}: expected finite numbers; got NaN or infinity at [{place}].")
+    return array
+
+
+def _array(path: Path, archive: zipfile.ZipFile, key: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    # numpy.load would allocate whatever size an array's header claims, so the claim is checked first.
+    try:
+        member = archive.getinfo(f"{key}.npy")
+    except KeyError:
+        raise InputError(f"{path}: has no array {key!r}; expected an archive as write_motion_npz makes.") from None
+    try:
+        with archive.open(member) as file:
+            found, dtype = _header(file)
+            claimed = math.prod(found) * dtype.itemsize
+            fits = 0 <= claimed <= _LARGEST and file.tell() + claimed == member.file_size
+    except _DAMAGE as error:
+        raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None
+    wanted = len(found) == len(shape) and all(w is None or w == f for w, f in zip(shape, found, strict=True))
+    if dtype.kind not in kinds or not wanted:
+        sizes = ", ".join("any" if size is None else str(size) for size in shape)
+        kind = {"f": "floating-point numbers", "U": "text", "iu": "integers", "fiu": "a number"}[kinds]
+        raise InputError(f"{path}: {key}: expected {kind} of shape ({sizes}); got {dtype} of shape {tuple(found)}.")
+    if not fits:
+        raise InputError(f"{path}: {key}: is damaged (its size differs from its header); write it again.")
+    try:
+        with archive.open(member) as file:
+            return np.lib.format.read_array(file, allow_pickle=False, max_header_size=_LONGEST_HEADER)
+    except _DAMAGE as error:
+        raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None
+
+
+def _header(file) -> tuple[tuple[int, ...], np.dtype]:
+    version = np.lib.format.read_magic(file)
+    if version not in ((1, 0), (2, 0)):
+        raise ValueError(f"array format {version[0]}.{version[1]}")
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file, max_header_size=_LONGEST_HEADER)
+    if dtype.hasobject:
+        raise ValueError("it holds Python objects")
+    return shape, dtype
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__

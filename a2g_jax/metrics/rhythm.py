@@ -1,0 +1,108 @@
+"""Does motion follow speech? Peaks of wrist speed against peaks of speech energy, with a null."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy import ndimage, signal
+
+from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.skeleton import BODY_JOINTS
+
+_WRISTS = tuple(BODY_JOINTS.index(name) for name in ("L_Wrist", "R_Wrist"))
+
+
+def speech_envelope(
+    audio: Float[np.ndarray, " N"], sample_rate: int, fps: float, frames: int, smoothing: float = 0.08
+) -> Float[np.ndarray, " T"]:
+    """Speech energy in dB at the motion's frame times, smoothed over about a syllable.
+
+    Args:
+        smoothing: standard deviation of the Gaussian window, seconds.
+    """
+    power = ndimage.gaussian_filter1d(np.square(audio, dtype=np.float64), smoothing * sample_rate, mode="constant")
+    samples = np.minimum(np.rint(np.arange(frames) * sample_rate / fps).astype(int), len(audio) - 1)
+    decibels = 10 * np.log10(power[samples] + 1e-12)
+    return np.maximum(decibels, decibels.max() - 50)
+
+
+def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: float = 6.0) -> Float[np.ndarray, " P"]:
+    """Times (s) of the loud syllables: peaks that stand out by ``prominence`` dB and by the louder half of all."""
+    peaks, _ = signal.find_peaks(envelope, prominence=prominence)
+    if len(peaks) == 0:
+        return np.zeros(0)
+    return peaks[envelope[peaks] >= np.median(envelope[peaks])] / fps
+
+
+def wrist_speed(motion: Motion, smoothing: float = 0.05) -> Float[np.ndarray, " T"]:
+    """Speed of the faster wrist in m/s, smoothed by a Gaussian of that many seconds; of all joints without wrists."""
+    body = find_body(motion.skeleton)
+    positions = motion.positions()
+    if body is not None:
+        positions = positions[:, [body[joint] for joint in _WRISTS]]
+    velocity = np.gradient(ndimage.gaussian_filter1d(positions, smoothing * motion.fps, axis=0), axis=0) * motion.fps
+    return np.linalg.norm(velocity, axis=-1).max(axis=-1)
+
+
+def speed_peaks(speed: Float[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " P"]:
+    """Times (s) of strokes: peaks of speed that stand out by a quarter of its 95th percentile."""
+    peaks, _ = signal.find_peaks(speed, prominence=max(0.25 * float(np.percentile(speed, 95)), 1e-3))
+    return peaks / fps
+
+
+def agreement(
+    motion_times: Float[np.ndarray, " M"], speech_times: Float[np.ndarray, " S"], sigma: float = 0.1, lead: float = 0.0
+) -> float:
+    """Mean over motion peaks of ``exp(-d^2 / 2 sigma^2)``, d the distance to the nearest speech peak, seconds.
+
+    The beat alignment of Li et al. 2021 ("AI Choreographer") with speech peaks for music beats; see
+    :func:`agreement_with_null` for what its number is worth.
+
+    Args:
+        lead: seconds by which a motion peak is expected before its speech peak.
+    """
+    if len(motion_times) == 0 or len(speech_times) == 0:
+        return 0.0
+    distance = np.abs(motion_times[:, None] + lead - speech_times[None]).min(axis=1)
+    return float(np.mean(np.exp(-(distance**2) / (2 * sigma**2))))
+
+
+class Agreement(NamedTuple):
+    """A beat alignment beside what the same motion scores when it is shifted against the speech."""
+
+    value: float
+    null_mean: float
+    null_std: float
+    null_max: float
+
+    @property
+    def z(self) -> float:
+        """How many standard deviations of the null the value lies above the null's mean."""
+        return (self.value - self.null_mean) / max(self.null_std, 1e-9)
+
+
+def agreement_with_null(
+    motion: Motion,
+    audio: Float[np.ndarray, " N"],
+    sample_rate: int,
+    *,
+    sigma: float = 0.1,
+    lead: float = 0.1,
+    shifts: Float[np.ndarray, " K"] | None = None,
+) -> Agreement:
+    """Agreement of speed peaks with energy peaks, and of the same motion moved by 1 to 5 s (circularly) either way.
+
+    Args:
+        lead: seconds from a stroke's fastest moment to its syllable's peak.
+        shifts: seconds; by default 34 from -5 to -1 and 1 to 5.
+    """
+    if shifts is None:
+        shifts = np.concatenate([np.linspace(-5, -1, 17), np.linspace(1, 5, 17)])
+    envelope = speech_envelope(audio, sample_rate, motion.fps, motion.frames)
+    speech = energy_peaks(envelope, motion.fps)
+    moves = speed_peaks(wrist_speed(motion), motion.fps)
+    scores = [agreement((moves + shift) % motion.seconds, speech, sigma, lead) for shift in shifts]
+    return Agreement(
+        agreement(moves, speech, sigma, lead), float(np.mean(scores)), float(np.std(scores)), float(np.max(scores))
+    )

@@ -1,0 +1,32 @@
+"""The models, by the names the command line knows them by."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from a2g_jax.errors import InputError
+from a2g_jax.models import audio2gestures
+from a2g_jax.models.base import Data, Model
+
+
+class Entry(NamedTuple):
+    """How to make a model."""
+
+    config_class: type
+    presets: Mapping[str, Any]
+    build: Callable[[Any, Data], Model]
+
+
+MODELS: dict[str, Entry] = {
+    "audio2gestures": Entry(audio2gestures.Audio2GesturesConfig, audio2gestures.PRESETS, audio2gestures.build),
+}
+
+
+def find_model(name: str) -> Entry:
+    """The model of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in MODELS:
+        raise InputError(f"no model {name!r}; there are: {', '.join(MODELS)}.")
+    return MODELS[name]

@@ -1,0 +1,71 @@
+"""Settings of Audio2Gestures and its presets."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Audio2GesturesConfig:
+    """Networks and losses; the defaults are the papers' (extended paper, Sec. 5.3; their code where silent)."""
+
+    audio_channels: tuple[int, ...] = (128, 128, 96, 96, 64)
+    """Residual blocks of the audio encoder."""
+    motion_channels: tuple[int, ...] = (256, 256, 128, 128, 64)
+    """Residual blocks of the motion encoder."""
+    decoder_channels: tuple[int, ...] = (64, 128, 128, 256, 256)
+    """Residual blocks of the decoder."""
+    kernel_size: int = 3
+    head_channels: int = 32
+    """Hidden width of the heads that predict means and log-variances."""
+    code_channels: int = 16
+    """Width of the shared and of the motion-specific code."""
+    dropout: float = 0.0
+    normalise_pose: bool = False
+    """Whether networks see and predict 6D rotations as z-scores of the training split; the papers use them raw."""
+
+    clip_frames: int = 128
+    """Frames in a training crop."""
+
+    rotation_weight: float = 1.0
+    position_weight: float = 1.0
+    speed_weight: float = 5.0
+    alignment_weight: float = 0.1
+    kl_weight: float = 1e-3
+    kl_ramp_steps: int = 100_000
+    """Steps over which the KL weight rises linearly from zero; 0 for none."""
+    relaxed_weight: float = 1.0
+    relaxed_threshold: float = 0.002
+    """Rho of the relaxed motion loss (Eq. 19), metres: 0.2 cm in the extended paper, 2 cm in the first."""
+    sampled_rotation_weight: float = 0.0
+    """Of the rotation loss on motions with a random specific code; the authors' code has 1, the papers no such loss."""
+    sampled_speed_weight: float = 0.0
+    """Of the speed loss on motions with a random specific code; the authors' code has 5, the papers no such loss."""
+    bicycle_weight: float = 0.1
+    diversity_weight: float = 0.1
+    diversity_decay_steps: int = 500_000
+    """Steps over which the diversity weight falls linearly to zero; 0 for never."""
+
+    redraw_frames: int = 0
+    """In generation, frames after which the motion-specific code's statistics are drawn anew, with linear blending.
+
+    0 keeps one draw for the whole audio, as the authors do; then a hidden choice such as the hand tends to stay the
+    same throughout a long speech.
+    """
+    sample_codes: bool = True
+    """In generation, draw codes from their posteriors, as the authors do; otherwise take their means (smoother)."""
+
+
+PRESETS: dict[str, Audio2GesturesConfig] = {
+    "paper": Audio2GesturesConfig(),
+    "tiny": Audio2GesturesConfig(
+        audio_channels=(64, 64, 64, 64, 64),
+        motion_channels=(64, 64, 64, 64, 64),
+        decoder_channels=(64, 64, 64, 96, 96),
+        normalise_pose=True,
+        # In metres the motion losses are hundredths; a KL weight of 1e-3 from early on empties the shared code.
+        kl_weight=2e-5,
+        kl_ramp_steps=1_000,
+        diversity_decay_steps=0,
+        redraw_frames=128,
+        sample_codes=False,
+    ),
+}

@@ -1,0 +1,1 @@
+"""Network layers, as Flax Linen modules used through ``init`` and ``apply`` only."""

@@ -1,0 +1,56 @@
+"""Noise that is a function of a key and the absolute frame, whatever window is asked for."""
+
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, Key
+
+#: Windows start at multiples of this many frames.
+BLOCK = 128
+
+Tree = TypeVar("Tree")
+
+
+def frame_normal(
+    key: Key[Array, ""], start: Int[Array, ""], frames: int, channels: int
+) -> Float[Array, "frames channels"]:
+    """Standard normal noise for frames ``start`` to ``start + frames``.
+
+    The same frame gets the same values in every window, because each block of 128 frames has a key of its own.
+
+    Args:
+        start: a multiple of 128; may be negative.
+        frames: any number.
+    """
+    blocks = -(-frames // BLOCK)
+    numbers = start // BLOCK + jnp.arange(blocks)
+    # Block numbers may be negative (context before the first frame); as unsigned they are still distinct.
+    keys = jax.vmap(lambda n: jax.random.fold_in(key, n.astype(jnp.uint32)))(numbers)
+    noise = jax.vmap(lambda k: jax.random.normal(k, (BLOCK, channels)))(keys)
+    return noise.reshape(blocks * BLOCK, channels)[:frames]
+
+
+def blended_draws(key: Key[Array, ""], table: Tree, start: Int[Array, ""], frames: int, period: int) -> Tree:
+    """Rows drawn at random from a table, one for every ``period`` frames, blended linearly in between.
+
+    Args:
+        table: a pytree of arrays (N, C); the same row is taken from each.
+        period: frames between draws; 0 for a single draw.
+
+    Returns:
+        The pytree with arrays (frames, C).
+    """
+    rows = jax.tree.leaves(table)[0].shape[0]
+
+    def draw(number):
+        return jax.random.randint(jax.random.fold_in(key, number.astype(jnp.uint32)), (), 0, rows)
+
+    if period == 0:
+        row = draw(jnp.zeros((), jnp.int32))
+        return jax.tree.map(lambda a: jnp.broadcast_to(a[row][None], (frames, a.shape[1])), table)
+    time = (start + jnp.arange(frames)) / period
+    first = jnp.floor(time).astype(jnp.int32)
+    weight = (time - first)[:, None]
+    low, high = jax.vmap(draw)(first), jax.vmap(draw)(first + 1)
+    return jax.tree.map(lambda a: a[low] * (1 - weight) + a[high] * weight, table)

@@ -1,0 +1,66 @@
+"""Checkpoints of a training run: Orbax, atomic, the latest few."""
+
+import os
+import shutil
+from pathlib import Path
+
+from orbax.checkpoint import v1 as ocp
+
+from a2g_jax.errors import InputError
+from a2g_jax.training.state import TrainState
+
+
+class Checkpoints:
+    """The checkpoints folder of a run. A checkpoint exists whole under its step's number or not at all."""
+
+    def __init__(self, folder: str | os.PathLike[str], keep: int) -> None:
+        self.folder = Path(folder).absolute()
+        self.keep = max(1, keep)
+
+    def steps(self) -> list[int]:
+        """Steps of the checkpoints there are, oldest first."""
+        if not self.folder.is_dir():
+            return []
+        return sorted(int(path.name) for path in self.folder.iterdir() if path.is_dir() and path.name.isdigit())
+
+    def save(self, state: TrainState) -> None:
+        """Save the state under its step, then remove all but the latest few."""
+        step = int(state.step)
+        path = self.folder / str(step)
+        if path.exists():
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        ocp.save(path, state._asdict())
+        for old in self.steps()[: -self.keep]:
+            shutil.rmtree(self.folder / str(old))
+
+    def restore(self, like: TrainState) -> TrainState | None:
+        """The latest state, or None if there is none.
+
+        Args:
+            like: a state with the run's shapes, such as that of step 0.
+
+        Raises:
+            InputError: the checkpoint is damaged or of another model.
+        """
+        steps = self.steps()
+        if not steps:
+            return None
+        path = self.folder / str(steps[-1])
+        try:
+            tree = ocp.load(path, like._asdict())
+        except Exception as error:
+            first = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"{path}: cannot be resumed from ({first[:200]}); remove this folder to go on from the one before it,"
+                " or start anew without --resume."
+            ) from error
+        return TrainState(**tree)
+
+
+def sweep_unfinished(folder: Path) -> None:
+    """Remove what a killed save left behind."""
+    if folder.is_dir():
+        for path in folder.iterdir():
+            if path.is_dir() and not path.name.isdigit():
+                shutil.rmtree(path, ignore_errors=True)

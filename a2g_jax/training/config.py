@@ -1,0 +1,53 @@
+"""Settings of a training run, the same for every model."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How a model is trained; the defaults are Audio2Gestures' (extended paper, Sec. 5.3.3)."""
+
+    steps: int = 180_000
+    """Training steps in all; resuming counts those already done."""
+    batch_size: int = 32
+    """Clips in a batch."""
+    learning_rate: float = 1e-4
+    """Of Adam; the peak, if a schedule moves it."""
+    schedule: str = "constant"
+    """'constant', or 'cosine': half a cosine down to a hundredth of the peak at the last step."""
+    warmup_steps: int = 0
+    """Steps over which the learning rate rises linearly from zero."""
+    clip_norm: float = 0.0
+    """Gradients longer than this are scaled down to it; 0 for never."""
+    augmentation: float = 0.0
+    """Strength of the random gain, equaliser and noise on audio features; 0 for none, 1 for a lot."""
+    seed: int = 0
+    """Of initial weights, batches and everything drawn in training."""
+    checkpoint_every: int = 1_000
+    """Steps between checkpoints."""
+    validate_every: int = 1_000
+    """Steps between validation losses."""
+    log_every: int = 20
+    """Steps between lines of metrics.jsonl and checks for NaN."""
+    keep_checkpoints: int = 2
+    """Latest checkpoints that are kept."""
+    device_megabytes: float = 2_000.0
+    """Corpora up to this size are held on the device; larger ones are read from disk batch by batch."""
+    tensorboard: bool = False
+    """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
+
+
+TRAIN_PRESETS: dict[str, TrainConfig] = {
+    "paper": TrainConfig(),
+    "tiny": TrainConfig(
+        steps=3_000,
+        batch_size=8,
+        learning_rate=1e-3,
+        schedule="cosine",
+        warmup_steps=100,
+        clip_norm=1.0,
+        augmentation=1.0,
+        checkpoint_every=500,
+        validate_every=500,
+    ),
+}

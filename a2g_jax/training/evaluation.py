@@ -1,0 +1,84 @@
+"""Figures taken during training: the validation loss, and what a model keeps about its latent space."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from a2g_jax.data.batches import Dressing, gather_from_disk, tiled_starts
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.geometry.kinematics import joint_positions
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.models.base import Batch, Model, Params, Summary
+from a2g_jax.training.run import RunConfig
+
+#: Most clips looked at for a validation loss, and for the latent statistics.
+_VALIDATION_CLIPS, _SUMMARY_CLIPS = 64, 4096
+_BATCH = 16
+
+
+def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: int):
+    """Batches of one shape over clips spread evenly through a split, with the number of clips that count in each."""
+    frames = model.clip_frames
+    starts = tiled_starts(corpus, split, frames)
+    if len(starts) == 0:
+        return
+    starts = starts[np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(int)]
+    dressing = Dressing(config.statistics["audio"], 0.0)
+    for first in range(0, len(starts), _BATCH):
+        rows = starts[np.minimum(np.arange(first, first + _BATCH), len(starts) - 1)]
+        audio, pose = gather_from_disk(corpus.audio, rows, frames), gather_from_disk(corpus.pose, rows, frames)
+        yield dressing(None, jnp.asarray(audio), jnp.asarray(pose)), min(_BATCH, len(starts) - first)
+
+
+def validate(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> dict[str, float]:
+    """Loss terms on the validation split with a fixed key, and the reconstruction beside the mean pose, in cm.
+
+    Empty when every validation stretch is shorter than a clip.
+    """
+    totals: dict[str, float] = {}
+    count = 0
+    loss, rebuild = jax.jit(model.loss), jax.jit(_rebuild, static_argnums=(0, 3))
+    offsets = jnp.asarray(config.skeleton.offsets)
+    for number, (batch, clips) in enumerate(_batches(model, corpus, config, "validation", _VALIDATION_CLIPS)):
+        value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
+        figures = {"loss": value, **terms}
+        figures |= rebuild(
+            _Static(model), params, batch, config.skeleton.parents, offsets, config.statistics["pose"].mean
+        )
+        for name, figure in figures.items():
+            totals[name] = totals.get(name, 0.0) + float(figure) * clips
+        count += clips
+    return {name: total / count for name, total in totals.items()}
+
+
+class _Static:
+    """A model as a static argument: one compilation for one reconstruct function."""
+
+    def __init__(self, model: Model) -> None:
+        self.reconstruct = model.reconstruct
+
+    def __hash__(self) -> int:
+        return hash(self.reconstruct)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Static) and self.reconstruct is other.reconstruct
+
+
+def _rebuild(model: _Static, params: Params, batch: Batch, parents, offsets, mean_pose):
+    """Mean distance of joints from where they were, for the reconstruction and for the mean pose."""
+    clips, frames = batch.pose.shape[:2]
+    still = jnp.broadcast_to(jnp.asarray(mean_pose)[None, None], (clips, frames, *mean_pose.shape))
+    poses = jnp.stack([batch.pose, model.reconstruct(params, batch), still])
+    target, rebuilt, mean = joint_positions(matrix_from_6d(poses), offsets, parents)
+    error = lambda p: 100 * jnp.mean(jnp.linalg.norm(p - target, axis=-1))  # noqa: E731
+    return {"reconstruction_cm": error(rebuilt), "mean_pose_cm": error(mean)}
+
+
+def collect_summary(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> Summary:
+    """:attr:`Model.summarise` of clips spread evenly through the training split, one row a clip."""
+    summarise = jax.jit(model.summarise)
+    parts: list[Summary] = []
+    for number, (batch, clips) in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS)):
+        part = summarise(params, jax.random.fold_in(jax.random.key(1), number), batch)
+        parts.append({name: np.asarray(value)[:clips] for name, value in part.items()})
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

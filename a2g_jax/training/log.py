@@ -1,0 +1,93 @@
+"""What a training run tells: a progress bar, metrics.jsonl, and TensorBoard if asked for."""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from a2g_jax.errors import InputError
+from a2g_jax.training.config import TrainConfig
+
+
+class MetricsLog:
+    """Writes ``metrics.jsonl`` in a run folder; use as a context manager.
+
+    One JSON object a line: ``step``, ``split`` ("train" or "validation") and the terms. Time is not among them, so that
+    a resumed run's file equals an uninterrupted one's.
+    """
+
+    def __init__(self, folder: Path, done: int, settings: TrainConfig, progress: bool) -> None:
+        self.path = folder / "metrics.jsonl"
+        self._drop_after(done)
+        self.settings = settings
+        self.tensorboard: Any = None
+        if settings.tensorboard:
+            try:
+                from tensorboardX import SummaryWriter
+            except ImportError:
+                raise InputError(
+                    "--tensorboard needs the extra of that name: pip install 'a2g_jax[tensorboard]'."
+                ) from None
+            self.tensorboard = SummaryWriter(str(folder / "tensorboard"), purge_step=done + 1)
+        from tqdm import tqdm
+
+        # A terminal gets a moving bar; a log file gets a line now and then.
+        every = 0.5 if sys.stderr.isatty() else 30.0
+        self.bar = tqdm(
+            total=settings.steps,
+            initial=done,
+            unit="step",
+            desc="training",
+            mininterval=every,
+            disable=not progress,
+            dynamic_ncols=sys.stderr.isatty(),
+            file=sys.stderr,
+        )
+        self.started = time.monotonic()
+
+    def __enter__(self) -> "MetricsLog":
+        self.file = self.path.open("a", encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.close()
+        self.bar.close()
+        if self.tensorboard is not None:
+            self.tensorboard.close()
+
+    def tick(self, step: int) -> None:
+        """A step was done."""
+        self.bar.update(step - self.bar.n)
+
+    def write(self, step: int, values: dict[str, float]) -> None:
+        """The terms of a training step."""
+        names = [name for name in ("loss", "position", "relaxed", "kl") if name in values]
+        self.bar.set_postfix({name: f"{values[name]:.4g}" for name in names}, refresh=False)
+        self.tick(step)
+        self._line(step, "train", values)
+
+    def write_validation(self, step: int, values: dict[str, float]) -> None:
+        """The mean terms over the validation split; nothing is written when there are none."""
+        if values:
+            self._line(step, "validation", values)
+
+    def _line(self, step: int, split: str, values: dict[str, float]) -> None:
+        self.file.write(json.dumps({"step": step, "split": split, **values}) + "\n")
+        self.file.flush()
+        if self.tensorboard is not None:
+            for name, value in values.items():
+                self.tensorboard.add_scalar(f"{split}/{name}", value, step)
+
+    def _drop_after(self, done: int) -> None:
+        """Forget lines of steps that will be done again, and a line that a kill cut short."""
+        if not self.path.exists():
+            return
+        kept = []
+        for line in self.path.read_text(encoding="utf-8").splitlines():
+            try:
+                if json.loads(line)["step"] <= done:
+                    kept.append(line)
+            except (ValueError, KeyError):
+                continue
+        self.path.write_text("".join(line + "\n" for line in kept), encoding="utf-8")

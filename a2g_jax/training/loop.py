@@ -1,0 +1,194 @@
+"""The training loop: one for every model."""
+
+import json
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from a2g_jax.data.batches import Dressing, draw_starts, find_crops, gather, gather_from_disk
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import A2GError, InputError
+from a2g_jax.io.files import read_json, write_json
+from a2g_jax.models.base import Model
+from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
+from a2g_jax.training.config import TrainConfig
+from a2g_jax.training.evaluation import collect_summary, validate
+from a2g_jax.training.log import MetricsLog
+from a2g_jax.training.run import RUN_FILE, Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
+
+#: Settings that may change between parts of a run, because they do not touch what is computed in a step.
+_FREE = frozenset(
+    {"steps", "checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "device_megabytes", "tensorboard"}
+)
+
+
+class TrainingError(A2GError):
+    """Training cannot go on: the message says at which step, why, and what to try."""
+
+
+class Interrupted(A2GError):
+    """Training was stopped from outside after saving its state."""
+
+
+def train(
+    config: RunConfig, corpus: Corpus, out: str | os.PathLike[str], *, resume: bool, progress: bool = True
+) -> Run:
+    """Train a model on a corpus; the run folder can generate at any time after the first checkpoint.
+
+    Killed at any moment and resumed, it ends with the same parameters, bit for bit, as if it had not been.
+
+    Args:
+        out: the run folder. It must not hold a run, unless resuming.
+        resume: go on from the latest checkpoint; starts anew where there is none.
+        progress: show a progress bar on standard error.
+
+    Raises:
+        InputError: the folder holds a run, or another run than the one to resume.
+        TrainingError: a loss or gradient was not finite; the last good checkpoint stays.
+        Interrupted: SIGINT or SIGTERM came; a checkpoint was saved.
+    """
+    out = Path(out)
+    settings = config.train_config
+    crops = find_crops(corpus, "train", config.model_config.clip_frames)
+    _check_folder(out, config, resume)
+    model = config.build()
+    out.mkdir(parents=True, exist_ok=True)
+    checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
+    sweep_unfinished(checkpoints.folder)
+    write_json(out / RUN_FILE, run_to_json(config, max(checkpoints.steps(), default=0)))
+
+    state = init_state(model, settings)
+    if resume and (restored := checkpoints.restore(state)) is not None:
+        state = restored
+    step_function = _step_function(model, settings, corpus, crops, config)
+    done = int(state.step)
+    export = partial(_export, config, model, corpus, out)
+    with MetricsLog(out, done, settings, progress) as log, _stop_requested() as stop:
+        while done < settings.steps:
+            state, metrics = step_function(state)
+            done += 1
+            if done % settings.log_every == 0 or done == settings.steps:
+                values = {name: float(value) for name, value in jax.device_get(metrics).items()}
+                _check_finite(state, done, values, checkpoints)
+                log.write(done, values)
+            else:
+                log.tick(done)
+            if done % settings.validate_every == 0 or done == settings.steps:
+                log.write_validation(done, validate(model, state.params, corpus, config))
+            if done % settings.checkpoint_every == 0 or done == settings.steps or stop.is_set():
+                _check_finite(state, done, {}, checkpoints)
+                checkpoints.save(state)
+                export(state)
+            if stop.is_set():
+                raise Interrupted(f"{out}: stopped after step {done} of {settings.steps}; go on with --resume.")
+    return export(state)
+
+
+def _check_folder(out: Path, config: RunConfig, resume: bool) -> None:
+    if out.is_file():
+        raise InputError(f"{out}: is a file; name a folder for the run.")
+    if not (out / RUN_FILE).exists():
+        if out.is_dir() and any(out.iterdir()):
+            raise InputError(f"{out}: is not empty and holds no run; choose another folder.")
+        return
+    if not resume:
+        raise InputError(f"{out}: holds a run already; go on with it by --resume, or choose another folder.")
+    values = read_json(out / RUN_FILE)
+    now = json.loads(json.dumps(run_to_json(config, 0)))
+    changed = [f"{key}: {values.get(key)}, now {now[key]}" for key in ("model", "fps") if values.get(key) != now[key]]
+    for part, free in (("model_config", frozenset()), ("train_config", _FREE), ("mel", frozenset())):
+        before = values.get(part) if isinstance(values.get(part), dict) else {}
+        changed += [
+            f"{name}: {before.get(name)}, now {value}"
+            for name, value in now[part].items()
+            if name not in free and before.get(name) != value
+        ]
+    if values.get("corpus", {}).get("fingerprint") != config.corpus["fingerprint"]:
+        changed.append("the corpus")
+    if changed:
+        raise InputError(f"{out}: was trained with other settings ({'; '.join(changed)}); resume with the same ones.")
+
+
+def _step_function(
+    model: Model, settings: TrainConfig, corpus: Corpus, crops: Any, config: RunConfig
+) -> Callable[[TrainState], tuple[TrainState, Metrics]]:
+    """One whole step: choose clips, augment, compute, update. The same numbers wherever the data lies."""
+    frames = model.clip_frames
+    dressing = Dressing(config.statistics["audio"], settings.augmentation)
+
+    def finish(state: TrainState, audio, pose) -> tuple[TrainState, Metrics]:
+        _, dress_key, model_key = step_keys(state.key, state.step)
+        return advance(model, settings, state, dressing(dress_key, audio, pose), model_key)
+
+    def starts(state: TrainState):
+        return draw_starts(step_keys(state.key, state.step)[0], crops, settings.batch_size)
+
+    megabytes = (corpus.audio.nbytes + corpus.pose.nbytes) / 1e6
+    if megabytes <= settings.device_megabytes:
+        audio, pose = jax.device_put(np.asarray(corpus.audio)), jax.device_put(np.asarray(corpus.pose))
+
+        @partial(jax.jit, donate_argnums=0)
+        def on_device(state: TrainState, audio, pose):
+            rows = starts(state)
+            return finish(state, gather(audio, rows, frames), gather(pose, rows, frames))
+
+        return lambda state: on_device(state, audio, pose)
+
+    choose = jax.jit(starts)
+    compute = jax.jit(finish, donate_argnums=0)
+
+    def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
+        rows = np.asarray(choose(state))
+        return compute(state, gather_from_disk(corpus.audio, rows, frames), gather_from_disk(corpus.pose, rows, frames))
+
+    return from_disk
+
+
+def _check_finite(state: TrainState, step: int, values: dict[str, float], checkpoints: Checkpoints) -> None:
+    if bool(state.good):
+        return
+    broken = ", ".join(name for name, value in values.items() if not np.isfinite(value))
+    last = max(checkpoints.steps(), default=None)
+    kept = "there is no checkpoint yet" if last is None else f"the checkpoint of step {last} is good"
+    raise TrainingError(
+        f"training went wrong at or shortly before step {step}: {broken or 'loss or gradient'} not finite; {kept};"
+        " try a lower --learning-rate or a --clip-norm."
+    )
+
+
+def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, state: TrainState) -> Run:
+    """Weights and latent statistics where generation finds them."""
+    params = jax.device_get(state.params)
+    summary = collect_summary(model, state.params, corpus, config)
+    run = Run(config, params, summary, int(state.step))
+    save_run(out, run)
+    return run
+
+
+@contextmanager
+def _stop_requested() -> Iterator[threading.Event]:
+    """An event that SIGINT and SIGTERM set, so that a step is never cut in half; a second signal ends at once."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def stop(number: int, _frame: Any) -> None:
+        event.set()
+        signal.signal(number, before[number])
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield event
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

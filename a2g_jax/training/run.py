@@ -1,0 +1,174 @@
+"""A run folder: everything that generation needs, in JSON and safetensors."""
+
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from flax.traverse_util import flatten_dict, unflatten_dict
+
+from a2g_jax import __version__
+from a2g_jax.config import from_json
+from a2g_jax.data.corpus import Corpus, skeleton_from_json, skeleton_to_json
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.files import atomic_path, read_json, write_json
+from a2g_jax.models import find_model
+from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.training.config import TrainConfig
+
+FORMAT = "a2g_jax run"
+VERSION = 1
+RUN_FILE = "run.json"
+WEIGHTS_FILE = "weights.safetensors"
+
+
+@dataclass(frozen=True, eq=False)
+class RunConfig:
+    """What a run is, apart from its weights."""
+
+    model: str
+    preset: str
+    model_config: Any
+    train_config: TrainConfig
+    fps: float
+    mel: MelConfig
+    skeleton: Skeleton
+    statistics: dict[str, Statistics]
+    """``audio``, ``pose`` and ``root`` of the corpus's training split."""
+    corpus: dict[str, Any]
+    """Fingerprint, recipe and length of the corpus."""
+
+    @classmethod
+    def of(cls, model: str, preset: str, model_config: Any, train_config: TrainConfig, corpus: Corpus) -> "RunConfig":
+        """The run of a model on a corpus."""
+        about = {
+            "fingerprint": corpus.fingerprint,
+            "recipe": corpus.recipe,
+            "seconds": corpus.frames / corpus.fps,
+        }
+        return cls(
+            model, preset, model_config, train_config, corpus.fps, corpus.mel, corpus.skeleton, corpus.statistics, about
+        )
+
+    def build(self) -> Model:
+        """The model's functions."""
+        data = Data(self.skeleton, self.fps, self.mel.bands, self.statistics["pose"])
+        return find_model(self.model).build(self.model_config, data)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A trained model with all that it needs."""
+
+    config: RunConfig
+    params: Params
+    summary: Summary
+    steps: int
+    """Training steps behind the weights."""
+
+
+def save_run(folder: str | os.PathLike[str], run: Run) -> None:
+    """Write ``run.json`` and ``weights.safetensors``, each whole or not at all."""
+    from safetensors.numpy import save_file
+
+    folder = Path(folder)
+    config = run.config
+    arrays = {f"params/{name}": value for name, value in flatten_dict(run.params, sep="/").items()}
+    arrays |= {f"summary/{name}": value for name, value in run.summary.items()}
+    for name, statistics in config.statistics.items():
+        arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
+    arrays = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
+    with atomic_path(folder / WEIGHTS_FILE) as temporary:
+        save_file(arrays, temporary)
+    write_json(folder / RUN_FILE, run_to_json(config, run.steps))
+
+
+def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
+    """The contents of ``run.json``."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "package": __version__,
+        "model": config.model,
+        "preset": config.preset,
+        "steps": steps,
+        "model_config": asdict(config.model_config),
+        "train_config": asdict(config.train_config),
+        "fps": config.fps,
+        "mel": asdict(config.mel),
+        "skeleton": skeleton_to_json(config.skeleton),
+        "corpus": config.corpus,
+    }
+
+
+def load_run(folder: str | os.PathLike[str]) -> Run:
+    """Read a run folder.
+
+    Raises:
+        InputError: not a run, nothing trained yet, or damaged or mismatching files.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load_file
+
+    folder = Path(folder)
+    about = folder / RUN_FILE
+    if not about.is_file():
+        raise InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
+    values = read_json(about)
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
+        raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
+    if values.get("version") != VERSION:
+        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it anew.")
+    weights = folder / WEIGHTS_FILE
+    if not weights.is_file():
+        raise InputError(f"{weights}: there is no such file; go on training with 'a2g train ... --resume'.")
+    try:
+        arrays = load_file(weights)
+    except (SafetensorError, OSError, ValueError) as error:
+        raise InputError(f"{weights}: is damaged ({error}); restore it or train again.") from None
+    try:
+        statistics = {
+            name: Statistics(arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"])
+            for name in ("audio", "pose", "root")
+        }
+        config = RunConfig(
+            model=values["model"],
+            preset=values["preset"],
+            model_config=from_json(find_model(values["model"]).config_class, values["model_config"], str(about)),
+            train_config=from_json(TrainConfig, values["train_config"], str(about)),
+            fps=float(values["fps"]),
+            mel=from_json(MelConfig, values["mel"], str(about)),
+            skeleton=skeleton_from_json(values["skeleton"]),
+            statistics=statistics,
+            corpus=values["corpus"],
+        )
+        steps = int(values["steps"])
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{folder}: is damaged ({error!r}); restore it or train again.") from None
+    params = unflatten_dict(
+        {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
+    )
+    _check_params(weights, config.build(), params)
+    summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
+    return Run(config, params, summary, steps)
+
+
+def _check_params(weights: Path, model: Model, params: Params) -> None:
+    """Shapes against the model's own, before anything is computed."""
+    import jax
+
+    expected = flatten_dict(jax.eval_shape(model.init, jax.random.key(0)), sep="/")
+    found = flatten_dict(params, sep="/")
+    for name in sorted({*expected, *found}):
+        want, got = expected.get(name), found.get(name)
+        if want is None or got is None or want.shape != got.shape:
+            shape = lambda array: "nothing" if array is None else tuple(array.shape)  # noqa: E731
+            raise InputError(f"{weights}: {name}: expected {shape(want)}; got {shape(got)}; it is of another model.")
+        if not np.all(np.isfinite(got)):
+            raise InputError(f"{weights}: {name} holds NaN or infinity; restore it or train again.")

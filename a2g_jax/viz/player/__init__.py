@@ -1,0 +1,6 @@
+"""The HTML page: figures side by side, in sync with their audio, in one file that needs no network."""
+
+from a2g_jax.viz.player.figure import Figure as Figure
+from a2g_jax.viz.player.figure import Track as Track
+from a2g_jax.viz.player.page import write_page as write_page
+from a2g_jax.viz.player.screenshot import screenshot_page as screenshot_page

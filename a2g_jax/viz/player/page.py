@@ -1,0 +1,122 @@
+"""Write the page: template, data and sound in one HTML file that needs no network."""
+
+import html
+import json
+import os
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.recording import Word
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import atomic_path
+from a2g_jax.viz.player.body import build_body
+from a2g_jax.viz.player.encode import encode_audio, encode_positions
+from a2g_jax.viz.player.figure import Figure
+from a2g_jax.viz.player.stage import body_points, placement
+
+#: Parts of the script, in the order in which they stand in the page.
+_SCRIPTS = ("math", "figures", "shaders", "webgl", "canvas", "layout", "timeline", "controls", "player")
+
+
+def write_page(
+    path: str | os.PathLike[str],
+    figures: Sequence[Figure],
+    audio: Float[np.ndarray, " N"],
+    sample_rate: int,
+    *,
+    title: str,
+    subtitle: str = "",
+    words: Sequence[Word] = (),
+    footer: str = "",
+) -> None:
+    """Write one self-contained HTML file that plays the figures side by side, in sync with the audio.
+
+    The page works from disk in any browser with WebGL 2 (or, more plainly, a 2D canvas), asks no server for anything,
+    and follows the reader's light or dark theme. Figures may differ in skeleton, frame rate and length; all start at
+    time zero of the audio, and one that ends before the audio holds its last frame.
+
+    Args:
+        path: the file to write, replaced as a whole.
+        figures: at least one.
+        audio: mono samples in -1 to 1; none at all gives a silent page as long as the longest motion.
+        sample_rate: of the audio, samples per second.
+        title: heading, also the name of the browser tab.
+        subtitle: a line under the heading.
+        words: spoken words, written under the waveform.
+        footer: a line at the foot of the page.
+
+    Raises:
+        InputError: no figures, a motion without frames, values that are not finite, or a motion spanning over 65 m.
+    """
+    if not figures:
+        raise InputError("the page has no figures; give at least one.")
+    data = {
+        "audio": encode_audio(audio, sample_rate) if audio.size else "",
+        "duration": audio.size / sample_rate if audio.size else max(figure.motion.seconds for figure in figures),
+        "words": [[word.text, word.start, word.end] for word in words],
+        "figures": [_figure(figure) for figure in figures],
+    }
+    page = fill_template(
+        _template("page.html"),
+        {
+            "title": html.escape(title),
+            "subtitle": html.escape(subtitle),
+            "footer": html.escape(footer),
+            "style": _template("player.css"),
+            "script": "\n".join(_template(f"{name}.js") for name in _SCRIPTS),
+            "data": script_json(data),
+        },
+    )
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+
+
+def fill_template(template: str, values: dict[str, str]) -> str:
+    """Replace each ``{{name}}`` by its value, in one pass, so that nothing inside a value is ever replaced."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found.group(1)], template)
+
+
+def script_json(value: dict) -> str:
+    """JSON that is safe inside a script element: no ``<``, ``>`` or ``&`` whatever the strings hold."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    # Lone surrogates cannot be written as UTF-8; JSON can spell them.
+    return "".join(f"\\u{ord(c):04x}" if "\ud800" <= c <= "\udfff" else c for c in text) if _lone(text) else text
+
+
+def _lone(text: str) -> bool:
+    return re.search("[\ud800-\udfff]", text) is not None
+
+
+def _figure(figure: Figure) -> dict:
+    motion = figure.motion
+    if motion.frames == 0:
+        raise InputError(f"figure {figure.label!r}: the motion has no frames; give it at least one.")
+    if not motion.fps > 0:
+        raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
+    body = build_body(motion.skeleton)
+    points = body_points(motion, body)
+    encoded = encode_positions(points, figure.label)
+    return {
+        "label": figure.label,
+        "note": figure.note,
+        "fps": motion.fps,
+        "frames": motion.frames,
+        "joints": list(motion.skeleton.names),
+        "points": len(body.points),
+        "axes": body.frames,
+        "shapes": [shape.encoded() for shape in body.shapes],
+        "wrists": list(body.wrists),
+        "place": placement(motion, points),
+        "tracks": [{"name": track.name, "spans": [list(span) for span in track.spans]} for track in figure.tracks],
+        **encoded,
+    }
+
+
+def _template(name: str) -> str:
+    return files("a2g_jax.viz.player").joinpath("template", name).read_text(encoding="utf-8")

@@ -1,0 +1,57 @@
+"""Where a figure stands on the page's stage: the place under it, the floor, which way is its front, how large it is."""
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.geometry.kinematics import global_rotations
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.viz.player.body import Body
+from a2g_jax.viz.player.roles import find_roles
+
+#: A figure whose mean front is within this angle (radians) of +Z keeps its own heading.
+_KEEP_HEADING = 0.6
+#: A floor within this distance (metres) of height zero is taken to be at zero, so that floating feet can be seen.
+_KEEP_FLOOR = 0.12
+
+
+def body_points(motion: Motion, body: Body) -> Float[np.ndarray, "T P 3"]:
+    """World positions of the joints, then of the points that are rigid to them, metres."""
+    joints = motion.positions().astype(np.float64)
+    extra = body.points[motion.skeleton.joints :]
+    if not extra:
+        return joints
+    owners = np.array([joint for joint, _ in extra])
+    offsets = np.array([offset for _, offset in extra])
+    rotations = jax.jit(jax.vmap(lambda frame: global_rotations(frame, motion.skeleton.parents)))(
+        np.asarray(motion.rotations, np.float32)
+    )
+    moved = np.einsum("tpij,pj->tpi", np.asarray(rotations, np.float64)[:, owners], offsets)
+    return np.concatenate([joints, joints[:, owners] + moved], axis=1)
+
+
+def placement(motion: Motion, points: Float[np.ndarray, "T P 3"]) -> dict:
+    """Centre and floor (metres), heading (radians about +Y, 0 faces +Z), height and reach (metres) for the layout."""
+    centre = np.median(points[:, 0], axis=0)
+    floor = float(np.percentile(points[..., 1].min(axis=1), 2))
+    roles = find_roles(motion.skeleton)
+    if roles is None or not roles.legs:
+        floor -= 0.02
+    elif abs(floor) < _KEEP_FLOOR:
+        floor = 0.0
+    heading = 0.0
+    if roles is not None:
+        across = points[:, roles.arms["left"].top] - points[:, roles.arms["right"].top]
+        # Front is left x up: across rotated by a quarter turn about +Y.
+        front = np.stack([-across[:, 2], across[:, 0]], axis=1).mean(axis=0)
+        angle = float(np.arctan2(front[0], front[1]))
+        if np.linalg.norm(front) > 0.02 and abs(angle) > _KEEP_HEADING:
+            heading = angle
+    height = float(np.percentile(points[..., 1].max(axis=1), 99)) - floor
+    away = np.linalg.norm(points[..., [0, 2]] - centre[[0, 2]], axis=2).max(axis=1)
+    return {
+        "centre": [round(float(centre[0]), 4), round(floor, 4), round(float(centre[2]), 4)],
+        "heading": round(heading, 4),
+        "height": round(max(height, 0.1), 4),
+        "reach": round(float(np.percentile(away, 85)), 4),
+    }
