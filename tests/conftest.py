@@ -1,12 +1,15 @@
 """What every test shares: strict JAX, two devices, keys, and the real recordings where they are."""
 
 import os
+from pathlib import Path
 
 # Before JAX starts: two virtual devices find sharding mistakes, and one compilation cache serves the whole session.
 os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-
-from pathlib import Path
+# Each training in a test is a new function to JAX, though the program is the same: compile it once, for subprocesses too.
+_CACHE = Path(__file__).parents[1] / ".cache" / "jax"
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_CACHE))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
 
 import jax
 import pytest
@@ -43,3 +46,47 @@ def shared() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real recordings at {folder} (set A2G_SHARED_DATA to a folder of them)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def toy_corpus(tmp_path_factory):
+    """Six generated recordings of ten seconds at 30 fps."""
+    from a2g_jax.data.corpus import Corpus
+    from a2g_jax.data.prepare import prepare_recording, write_corpus
+    from a2g_jax.data.talker.recordings import talk
+    from a2g_jax.features.mel import MelConfig
+
+    mel = MelConfig()
+    rows = (prepare_recording(talk(10.0, seed, name=f"take{seed}"), 30.0, mel) for seed in range(6))
+    path = tmp_path_factory.mktemp("toy") / "corpus"
+    write_corpus(path, rows, fps=30.0, mel=mel, recipe={"reader": "talker"})
+    return Corpus.open(path)
+
+
+#: Settings that make Audio2Gestures train in a second a hundred steps.
+TOY_MODEL = {
+    "audio_channels": (8, 8),
+    "motion_channels": (8, 8),
+    "decoder_channels": (8, 8),
+    "head_channels": 8,
+    "code_channels": 4,
+    "clip_frames": 16,
+}
+
+
+@pytest.fixture
+def toy_run_config(toy_corpus):
+    """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings."""
+    import dataclasses
+
+    from a2g_jax.models import find_model
+    from a2g_jax.training.config import TRAIN_PRESETS
+    from a2g_jax.training.run import RunConfig
+
+    def make(**changes):
+        model = dataclasses.replace(find_model("audio2gestures").presets["tiny"], **TOY_MODEL)
+        settings = {"steps": 30, "batch_size": 4, "checkpoint_every": 10, "validate_every": 15, "log_every": 5}
+        training = dataclasses.replace(TRAIN_PRESETS["tiny"], **{**settings, **changes})
+        return RunConfig.of("audio2gestures", "tiny", model, training, toy_corpus)
+
+    return make

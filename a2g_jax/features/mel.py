@@ -43,7 +43,9 @@ def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
     """
     size = max(1, int(0.025 * sample_rate))
     count = len(audio) // size
-    if count == 0:
+    if len(audio) == 0:
+        power = np.zeros(1)
+    elif count == 0:
         power = np.mean(np.square(audio, dtype=np.float64), keepdims=True)
     else:
         power = np.mean(np.square(audio[: count * size].reshape(count, size), dtype=np.float64), axis=1)

@@ -14,11 +14,11 @@ class Statistics:
     mean: Float[Array | np.ndarray, "*feature"]
     std: Float[Array | np.ndarray, "*feature"]
 
-    def normalise(self, x: Float[Array, "..."]) -> Float[Array, "..."]:
+    def normalise(self, x: Float[Array | np.ndarray, "..."]) -> Float[Array | np.ndarray, "..."]:
         """``(x - mean) / std`` over the trailing axes."""
         return (x - self._like(self.mean, x)) / self._like(self.std, x)
 
-    def denormalise(self, x: Float[Array, "..."]) -> Float[Array, "..."]:
+    def denormalise(self, x: Float[Array | np.ndarray, "..."]) -> Float[Array | np.ndarray, "..."]:
         """Inverse of :meth:`normalise`."""
         return x * self._like(self.std, x) + self._like(self.mean, x)
 

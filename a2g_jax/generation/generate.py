@@ -34,6 +34,7 @@ class Generator:
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
+        self._mean_pose = np.asarray(matrix_from_6d(np.asarray(run.config.statistics["pose"].mean)))
 
         @jax.jit
         def sample(params, summary, key, condition, start):
@@ -77,7 +78,13 @@ class Generator:
         frames = self.frames(audio)
         if frames == 0:
             raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
-        windows = list(self._windows(audio, frames))
+        config = self.run.config
+        yield from self.stream_features(log_mel(audio, config.mel, config.fps, frames), samples, seed)
+
+    def stream_features(self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0) -> Iterator[Motion]:
+        """:meth:`stream` for log-mel features that are there already, one row a frame, not normalised."""
+        frames = len(features)
+        windows = list(self._windows(features))
         key = jax.random.key(seed)
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
@@ -85,15 +92,14 @@ class Generator:
             rotations = np.concatenate([np.asarray(part) for part in parts])[:frames]
             yield self._motion(rotations)
 
-    def _windows(self, audio: Float[np.ndarray, " N"], frames: int):
+    def _windows(self, features: Float[np.ndarray, "T bands"]):
         """First frame (context included) and encoded audio of each window."""
-        config = self.run.config
-        features = log_mel(audio, config.mel, config.fps, frames)
+        frames = len(features)
         count = -(-frames // WINDOW)
         after = count * WINDOW - frames + self._halo
         # The quietest value is what silence looks like after the features' floor.
         padded = np.pad(features, ((self._halo, after), (0, 0)), constant_values=float(features.min()))
-        normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)
+        normalised = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
         for start in range(0, count * WINDOW, WINDOW):
             window = normalised[start : start + WINDOW + 2 * self._halo]
             yield start - self._halo, self._condition(self._params, window)
@@ -103,5 +109,5 @@ class Generator:
         return plant_feet(
             Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps),
             np.asarray(config.statistics["root"].mean),
-            np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean))),
+            self._mean_pose,
         )

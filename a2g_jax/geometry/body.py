@@ -21,9 +21,10 @@ _SMPLX = {re.sub("[^a-z0-9]", "", name.lower()): index for index, name in enumer
 def find_body(skeleton: Skeleton) -> tuple[int, ...] | None:
     """Index of each of the 22 body joints (:data:`~a2g_jax.geometry.skeleton.BODY_JOINTS`, in their order).
 
-    Knows SMPL-X names and the Hips/Spine/LeftArm family that BEAT, ZeroEGGS, Trinity and Mixamo share, with any prefix
-    (``mixamorig:``), case or separator. Spines are counted, not named: of three or more between pelvis and neck the
-    first, the middle and the last are taken. None when a joint is missing or the tree contradicts the names.
+    Knows SMPL-X names, the Hips/Spine/LeftArm family that BEAT, ZeroEGGS, Trinity and Mixamo share, and Unreal's
+    ``upperarm_l``, with any prefix (``mixamorig:``), case or separator. Spines are counted, not named: of three or more
+    between pelvis and neck the first, the middle and the last are taken. None when a joint is missing or the tree
+    contradicts the names.
     """
     plain = [_plain(name) for name in skeleton.names]
     found = _smplx(plain)
@@ -37,32 +38,30 @@ def _plain(name: str) -> str:
 
 
 def _smplx(plain: list[str]) -> tuple[int, ...] | None:
+    short = [re.sub("^(left|right)", lambda word: word[0][0], name) for name in plain]
     try:
-        return tuple(plain.index(name) for name in _SMPLX)
+        return tuple(short.index(name) for name in _SMPLX)
     except ValueError:
         return None
 
 
-def _side(plain: str) -> tuple[str, str] | None:
-    """('L' or 'R', the rest of the name)."""
+def _sides(plain: str) -> list[tuple[str, str]]:
+    """What a name may mean: ('L' or 'R', the rest of the name). "lowerarmr" starts with an L and means R."""
     for word, letter in (("left", "L"), ("right", "R")):
         if word in plain:
-            return letter, plain.replace(word, "", 1)
-    if plain[:1] in "lr" and len(plain) > 2:
-        return plain[0].upper(), plain[1:]
-    if plain[-1:] in "lr" and len(plain) > 2:
-        return plain[-1].upper(), plain[:-1]
-    return None
+            return [(letter, plain.replace(word, "", 1))]
+    ways = ((plain[:1], plain[1:]), (plain[-1:], plain[:-1]))
+    return [(letter.upper(), rest) for letter, rest in ways if letter in ("l", "r") and len(rest) > 1]
 
 
 def _humanoid(skeleton: Skeleton, plain: list[str]) -> tuple[int, ...] | None:
     joints: dict[str, int] = {}
-    sides = [_side(name) for name in plain]
+    sides = [_sides(name) for name in plain]
     for part, names in _SIDED.items():
         for letter in "LR":
             # Aliases are ordered: the first that exists wins, so "toebase" beats "forefoot".
             for alias in names:
-                hits = [index for index, side in enumerate(sides) if side == (letter, alias)]
+                hits = [index for index, side in enumerate(sides) if (letter, alias) in side]
                 if hits:
                     joints.setdefault(f"{letter}_{part}", hits[0])
                     break

@@ -34,7 +34,7 @@ def safe_norm(vector: Float[Array, " n"]) -> Float[Array, ""]:
 
 @_vectorize(signature="(6)->(3,3)")
 def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
-    """Gram-Schmidt of the two 3-vectors in ``six``: always a rotation, also for zero or parallel vectors.
+    """Gram-Schmidt of the two 3-vectors in ``six``: always a rotation, also for zero, parallel or overflowing vectors.
 
     Degenerate input falls back to a fixed axis, with zero gradient through the part that carries no information.
     Written in components because XLA fuses those into one loop; with dot products and stacks of 3-vectors the
@@ -44,7 +44,8 @@ def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
     ax, ay, az, bx, by, bz = six
 
     square = ax * ax + ay * ay + az * az
-    usable = square > eps
+    # A length whose square overflows would leave zeros behind.
+    usable = (square > eps) & (square < jnp.inf)
     inverse = 1 / jnp.sqrt(jnp.where(usable, square, 1.0))
     ax, ay, az = (jnp.where(usable, value * inverse, spare) for value, spare in ((ax, 1.0), (ay, 0.0), (az, 0.0)))
 
@@ -205,14 +206,17 @@ def euler_from_matrix(matrix: Float[Array, "*batch 3 3"], order: str) -> Float[A
             across = safe_norm(jnp.stack([m[i, j], m[i, third]]))
             middle = jnp.arctan2(across, m[i, i])
             first = jnp.arctan2(m[j, i], -sign * m[third, i])
-            last = jnp.arctan2(m[i, j], sign * m[i, third])
         else:
             across = safe_norm(jnp.stack([m[i, i], m[i, j]]))
             middle = jnp.arctan2(sign * m[i, k], across)
             first = jnp.arctan2(-sign * m[j, k], m[k, k])
-            last = jnp.arctan2(-sign * m[i, j], m[i, i])
         locked = across < 10 * jnp.finfo(m.dtype).eps
         first = jnp.where(locked, jnp.arctan2(sign * m[third, j], m[j, j]), first)
+        # The last angle from R_first^T R = R_second R_third, whose row j is that of R_third. Near gimbal lock, where
+        # the first angle is uncertain, the last then makes up for it.
+        cosine, sine = jnp.cos(first), sign * jnp.sin(first)
+        row = cosine * m[j] + sine * m[third]
+        last = jnp.arctan2(-sign * row[third], row[j]) if proper else jnp.arctan2(sign * row[i], row[j])
         last = jnp.where(locked, 0.0, last)
         return jnp.stack([first, middle, last])
 

@@ -40,14 +40,20 @@ def _conv_backward(dilation, saved, dy):
     x, kernel = saved
     taps, channels, features = kernel.shape
     dx = _conv(dy, kernel[::-1].transpose(0, 2, 1), dilation)
-    pad = dilation * (taps // 2)
-    padded = jnp.pad(x, ((0, 0), (pad, pad), (0, 0)))
-    frames = x.shape[1]
-    flat = dy.reshape(-1, features)
-    dkernel = [
-        padded[:, tap * dilation : tap * dilation + frames].reshape(-1, channels).T @ flat for tap in range(taps)
-    ]
+    flat = lambda array: array.reshape(-1, array.shape[-1])  # noqa: E731
+    offsets = [dilation * (tap - taps // 2) for tap in range(taps)]
+    # Frames of one side slide past the other; the one with fewer channels does, because sliding is a copy.
+    if channels < features:
+        dkernel = [flat(_slide(x, offset)).T @ flat(dy) for offset in offsets]
+    else:
+        dkernel = [flat(x).T @ flat(_slide(dy, -offset)) for offset in offsets]
     return dx, jnp.stack(dkernel)
+
+
+def _slide(x, offset):
+    """Frame t of the result is frame t + offset of ``x``, or zeros where there is none."""
+    # One operation, so one copy; none for the middle tap.
+    return x if offset == 0 else lax.pad(x, jnp.zeros((), x.dtype), ((0, 0, 0), (-offset, offset, 0), (0, 0, 0)))
 
 
 conv1d.defvjp(_conv_forward, _conv_backward)

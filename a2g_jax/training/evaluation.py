@@ -30,16 +30,18 @@ def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: 
         yield dressing(None, jnp.asarray(audio), jnp.asarray(pose)), min(_BATCH, len(starts) - first)
 
 
-def validate(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> dict[str, float]:
-    """Loss terms on the validation split with a fixed key, and the reconstruction beside the mean pose, in cm.
+def validate(
+    model: Model, params: Params, corpus: Corpus, config: RunConfig, split: str = "validation"
+) -> dict[str, float]:
+    """Loss terms on a held-out split with a fixed key, and the reconstruction beside the mean pose, in cm.
 
-    Empty when every validation stretch is shorter than a clip.
+    Empty when every stretch of the split is shorter than a clip.
     """
     totals: dict[str, float] = {}
     count = 0
     loss, rebuild = jax.jit(model.loss), jax.jit(_rebuild, static_argnums=(0, 3))
     offsets = jnp.asarray(config.skeleton.offsets)
-    for number, (batch, clips) in enumerate(_batches(model, corpus, config, "validation", _VALIDATION_CLIPS)):
+    for number, (batch, clips) in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
         value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
         figures = {"loss": value, **terms}
         figures |= rebuild(

@@ -62,7 +62,7 @@ class MetricsLog:
 
     def write(self, step: int, values: dict[str, float]) -> None:
         """The terms of a training step."""
-        names = [name for name in ("loss", "position", "relaxed", "kl") if name in values]
+        names = [name for name in ("loss", "position", "relaxed", "gradient_norm") if name in values]
         self.bar.set_postfix({name: f"{values[name]:.4g}" for name in names}, refresh=False)
         self.tick(step)
         self._line(step, "train", values)

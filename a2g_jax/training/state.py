@@ -54,7 +54,7 @@ def init_state(model: Model, config: TrainConfig) -> TrainState:
     """A run at step 0."""
     key = jax.random.key(config.seed)
     # Step numbers count up from 0, so the initial weights take the one number that no step has.
-    params = model.init(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
+    params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
     return TrainState(params, make_optimiser(config).init(params), jnp.zeros((), jnp.int32), key, jnp.array(True))
 
 

@@ -38,11 +38,19 @@ class _Arm:
     track: Track
     free: float
     spans: list[PhaseSpan]
-    resting: bool = True
 
     def mark(self, phase: str, begin: float, end: float) -> None:
         if end > begin:
             self.spans.append(PhaseSpan(begin, end, phase, self.hand))
+
+    def interrupt(self, time: float) -> None:
+        """A new movement sets in at ``time``, maybe before the last retraction has faded out."""
+        while self.spans and self.spans[-1].end > time:
+            last = self.spans.pop()
+            if last.phase == "stroke":
+                time = last.end
+            self.mark(last.phase, last.start, time)
+        self.free = time
 
 
 def plan_arms(
@@ -58,7 +66,7 @@ def plan_arms(
         strokes = [draws.strokes[index] for index in unit.strokes]
         hands = ("left", "right") if unit.hand == "both" else (unit.hand,)
         lead = dominant if unit.hand == "both" else unit.hand
-        timings = [_stroke_timing(stroke, strokes, style, rng) for stroke in strokes]
+        timings = [_stroke_timing(stroke, draws.strokes, style, rng) for stroke in strokes]
         shapes = [
             stroke_controls(unit.family, unit.place, unit.hand == "both", order, len(strokes), stroke.size, style, rng)
             for order, stroke in enumerate(strokes)
@@ -90,7 +98,7 @@ def _next_stroke(draws: GestureDraws, number: int, hand: str) -> Stroke | None:
 
 
 def _stroke_timing(
-    stroke: Stroke, strokes: list[Stroke], style: GestureStyle, rng: np.random.Generator
+    stroke: Stroke, strokes: Sequence[Stroke], style: GestureStyle, rng: np.random.Generator
 ) -> StrokeTiming:
     # Larger strokes take a little longer (isochrony), tight sequences force shorter ones.
     gaps = [abs(other.apex - stroke.apex) for other in strokes if other is not stroke]
@@ -140,7 +148,8 @@ def _gesture(
             want = rng.uniform(0.50, 0.72) / tempo
             begin = max(timing.begin - want, min(arm.free - 0.15, timing.begin - 0.22))
             arm.mark("rest", arm.free, begin)
-            arm.mark("preparation", max(begin, arm.free), timing.begin)
+            arm.interrupt(begin)
+            arm.mark("preparation", arm.free, timing.begin)
         else:
             begin = _between(arm, timings[order - 1], timing, strokes[order - 1], holds, style, rng)
         arm.track.step_to(ready, begin, timing.begin + _BLEND)

@@ -68,9 +68,9 @@ def plan_posture(plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng
     _shift_gaze(track, plan.seconds, style, rng)
     _nod(track, plan, style, rng)
     _follow_arms(track, draws, style, rng)
-    degrees = np.deg2rad([1.0, 0.4, 0.4, 1.7, 0.9, 0.9, 2.2, 1.4, 1.3])
-    sizes = np.concatenate([[0.013, 0.001, 0.012], degrees]) * style.sway
-    sway = draw_waves(rng, sizes, 0.06, 0.7)
+    degrees = np.deg2rad([1.2, 0.5, 0.6, 2.0, 1.1, 1.2, 2.4, 1.5, 1.5])
+    sizes = np.concatenate([[0.015, 0.001, 0.014], degrees]) * style.sway
+    sway = draw_waves(rng, sizes, 0.07, 0.75)
     breath = (rng.uniform(0.21, 0.29), rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, 2.0 * np.pi))
     return PosturePlan(stance, track, sway, breath)
 
@@ -160,9 +160,9 @@ def _follow_arms(track: Track, draws: GestureDraws, style: GestureStyle, rng: np
         track.add_pulse(turn, strokes[0].apex - 0.75, strokes[0].apex + 0.1, strokes[-1].apex + rng.uniform(1.0, 1.8))
         for stroke in strokes:
             push = np.zeros(CHANNELS)
-            push[6] = np.deg2rad(rng.normal(1.6, 0.9)) * (side or rng.choice((-0.6, 0.6))) * stroke.size * reach
-            push[7] = np.deg2rad(rng.normal(0.0, 1.0)) * stroke.size
-            push[8] = np.deg2rad(rng.uniform(0.8, 2.6)) * stroke.size * reach
+            push[6] = np.deg2rad(rng.normal(2.2, 1.2)) * (side or rng.choice((-0.6, 0.6))) * stroke.size * reach
+            push[7] = np.deg2rad(rng.normal(0.0, 1.3)) * stroke.size
+            push[8] = np.deg2rad(rng.uniform(1.1, 3.3)) * stroke.size * reach
             push[11] = -0.5 * push[8]
             push[1] = -0.002 * stroke.size
             track.add_pulse(push, stroke.apex - 0.32, stroke.apex + 0.05, stroke.apex + 0.6)

@@ -1,6 +1,5 @@
 """Whole recordings of the generated corpus: a plan, its voice, and one of its many right motions."""
 
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -8,6 +7,7 @@ import jax
 import numpy as np
 
 from a2g_jax.data.recording import Recording, Word
+from a2g_jax.data.talker.augment import augment
 from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.data.talker.gestures import gesticulate
 from a2g_jax.data.talker.plan import plan_speech
@@ -21,7 +21,7 @@ from a2g_jax.geometry.motion import Motion
 #: Length of one recording of a corpus, seconds.
 RECORDING_SECONDS = 60.0
 # What a recording's seed is split into; new uses get new numbers, so that old seeds keep their meaning.
-_SPEECH, _VOICE, _MOTION, _CAST = range(4)
+_SPEECH, _VOICE, _MOTION, _CAST, _ROOM = range(5)
 
 
 def talk(
@@ -33,6 +33,7 @@ def talk(
     fps: float = 30.0,
     sample_rate: int = 16000,
     name: str = "",
+    room: bool = False,
 ) -> Recording:
     """Generate one recording: someone says something in an invented language, and gestures.
 
@@ -44,6 +45,7 @@ def talk(
         seed: of everything that is drawn.
         speaker: one of :data:`~a2g_jax.data.talker.speakers.SPEAKERS`.
         emotion: one of :data:`~a2g_jax.data.talker.emotions.VOICE_EMOTIONS`.
+        room: as heard by some microphone in some room, with noise, instead of clean.
 
     Raises:
         InputError: unknown speaker or emotion, or too short.
@@ -53,9 +55,12 @@ def talk(
             raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
     plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH]))
     motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps)
+    audio = synthesise(plan, np.random.default_rng([seed, _VOICE]), sample_rate)
+    if room:
+        audio = augment(audio, sample_rate, np.random.default_rng([seed, _ROOM]))
     return Recording(
         name=name or f"talker_{seed}_{speaker}_{emotion}",
-        audio=synthesise(plan, np.random.default_rng([seed, _VOICE]), sample_rate),
+        audio=audio,
         sample_rate=sample_rate,
         motion=motion,
         words=tuple(Word(word.text, word.start, word.end) for word in plan.words),
@@ -108,7 +113,8 @@ def cast(
 ) -> list[dict[str, Any]]:
     """Who says what in a corpus: arguments of :func:`talk` for each recording of a minute (the last may be shorter).
 
-    Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time.
+    Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording is
+    heard in a room, so that models trained on the corpus also hear speech that was not recorded in a studio.
     """
     known_speakers, known_emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
     total = minutes * 60.0
@@ -128,12 +134,7 @@ def cast(
                 "speaker": known_speakers[order[index % len(known_speakers)]],
                 "emotion": "neutral" if neutral else str(rng.choice(known_emotions)),
                 "name": f"{index:04d}",
+                "room": index % 2 == 1,
             }
         )
     return roles
-
-
-def recordings(minutes: float, seed: int, fps: float = 30.0) -> Iterator[Recording]:
-    """The recordings of a generated corpus, one at a time."""
-    for role in cast(minutes, seed):
-        yield talk(**role, fps=fps)

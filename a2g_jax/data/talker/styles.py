@@ -178,7 +178,7 @@ def gesture_style(speaker: str, emotion: str) -> GestureStyle:
     return replace(
         style,
         threshold=min(max(style.threshold + change.threshold, 0.05), 0.9),
-        spacing=style.spacing / change.speed**0.5,
+        spacing=max(style.spacing / change.speed**0.5, 0.35),
         height=style.height + change.height,
         spread=style.spread + change.spread,
         radius=style.radius * change.extent,

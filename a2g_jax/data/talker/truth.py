@@ -18,7 +18,7 @@ class Stroke:
     family: str
     """'beat', 'offer', 'sweep', 'point', 'list' or 'frame'. Hidden: drawn per gesture unit."""
     hold: float
-    """Post-stroke hold in seconds. Hidden."""
+    """Post-stroke hold in seconds, where the next movement leaves room for it. Hidden."""
     unit: int
     """Index of the gesture unit (from leaving rest to coming back to it)."""
 
@@ -60,7 +60,7 @@ class GestureTruth:
     rest_pose: str
     """'sides', 'belly' or 'clasped'. Hidden: drawn per recording."""
     log_probability: float
-    """Log-probability (nats) of the discrete hidden choices, given the speech plan and the speaker."""
+    """Log-probability (nats) of the discrete hidden choices (rest pose, posture, units) given plan and speaker."""
     posture: str = "even"
     """Where the weight rests: 'even', 'left' or 'right'. Hidden: drawn per recording."""
     units: tuple[GestureUnit, ...] = ()

@@ -29,9 +29,17 @@ class Audio2GesturesConfig:
     position_weight: float = 1.0
     speed_weight: float = 5.0
     alignment_weight: float = 0.1
-    kl_weight: float = 1e-3
+    alignment_ramp_steps: int = 0
+    """Steps over which the alignment weight rises linearly from zero; 0 for none.
+
+    At Xavier's weights the two shared codes lie far apart, and the quickest way together is to become constant.
+    """
+    kl_shared_weight: float = 1e-3
+    """Of the KL divergence of the shared codes S_A and S_M."""
+    kl_specific_weight: float = 1e-3
+    """Of the KL divergence of the motion-specific codes I_M and I_R."""
     kl_ramp_steps: int = 100_000
-    """Steps over which the KL weight rises linearly from zero; 0 for none."""
+    """Steps over which the KL weights rise linearly from zero; 0 for none."""
     relaxed_weight: float = 1.0
     relaxed_threshold: float = 0.002
     """Rho of the relaxed motion loss (Eq. 19), metres: 0.2 cm in the extended paper, 2 cm in the first."""
@@ -61,9 +69,17 @@ PRESETS: dict[str, Audio2GesturesConfig] = {
         motion_channels=(64, 64, 64, 64, 64),
         decoder_channels=(64, 64, 64, 96, 96),
         normalise_pose=True,
-        # In metres the motion losses are hundredths; a KL weight of 1e-3 from early on empties the shared code.
-        kl_weight=2e-5,
+        # In metres the motion losses are hundredths. At the papers' weights the alignment and KL losses empty the
+        # shared code within the first hundreds of steps; a narrow specific code and the losses that the authors' code
+        # puts on sampled motions make the decoder need it.
+        kl_shared_weight=1e-6,
+        kl_specific_weight=1e-4,
         kl_ramp_steps=1_000,
+        alignment_weight=0.02,
+        alignment_ramp_steps=2_000,
+        sampled_rotation_weight=0.3,
+        sampled_speed_weight=2.5,
+        diversity_weight=0.05,
         diversity_decay_steps=0,
         redraw_frames=128,
         sample_codes=False,

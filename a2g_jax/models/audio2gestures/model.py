@@ -11,7 +11,14 @@ from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
 from a2g_jax.models.audio2gestures import losses
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
-from a2g_jax.models.audio2gestures.networks import AudioEncoder, Decoder, Gaussian, MappingNet, MotionEncoder
+from a2g_jax.models.audio2gestures.networks import (
+    MAPPING_LAYERS,
+    AudioEncoder,
+    Decoder,
+    Gaussian,
+    MappingNet,
+    MotionEncoder,
+)
 from a2g_jax.models.base import Batch, Data, Model, Params, Summary
 from a2g_jax.nn.noise import blended_draws, frame_normal
 from a2g_jax.nn.tcn import receptive_halo
@@ -103,7 +110,9 @@ def build(config: Audio2GesturesConfig, data: Data) -> Model:
         """Sum of weighted terms; each term is reported unweighted under its name."""
         terms = _terms(networks, params, key, batch)
         weights = weighted(step)
-        total = sum((weights[name] * terms[name] for name in weights), start=jnp.zeros(()))
+        # XLA keeps a product with a constant zero, and the whole gradient behind it: leave those terms out.
+        used = [name for name, weight in weights.items() if not (isinstance(weight, float) and weight == 0.0)]
+        total = sum((weights[name] * terms[name] for name in used), start=jnp.zeros(()))
         return total, terms
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
@@ -138,7 +147,9 @@ def build(config: Audio2GesturesConfig, data: Data) -> Model:
         return networks.decode(params, shared.mean, specific.mean)
 
     blocks = max(len(config.audio_channels), len(config.motion_channels))
-    halo = receptive_halo(blocks, config.kernel_size) + receptive_halo(len(config.decoder_channels), config.kernel_size)
+    # The decoder sees codes from an encoder or from the mapping net, whichever reaches farther.
+    reach = max(receptive_halo(blocks, config.kernel_size), MAPPING_LAYERS * (config.kernel_size // 2))
+    halo = reach + receptive_halo(len(config.decoder_channels), config.kernel_size)
     return Model(
         "audio2gestures",
         config,
@@ -157,14 +168,16 @@ def _weights(config: Audio2GesturesConfig) -> Any:
     """Weight of each term as a function of the step."""
 
     def at(step: Int[Array, ""]) -> dict[str, Any]:
+        together = jnp.minimum(step / config.alignment_ramp_steps, 1.0) if config.alignment_ramp_steps else 1.0
         ramp = jnp.minimum(step / config.kl_ramp_steps, 1.0) if config.kl_ramp_steps else 1.0
         decay = jnp.maximum(1.0 - step / config.diversity_decay_steps, 0.0) if config.diversity_decay_steps else 1.0
         return {
             "rotation": config.rotation_weight,
             "position": config.position_weight,
             "speed": config.speed_weight,
-            "alignment": config.alignment_weight,
-            "kl": config.kl_weight * ramp,
+            "alignment": config.alignment_weight * together,
+            "kl_shared": config.kl_shared_weight * ramp,
+            "kl_specific": config.kl_specific_weight * ramp,
             "relaxed": config.relaxed_weight,
             "sampled_rotation": config.sampled_rotation_weight,
             "sampled_speed": config.sampled_speed_weight,
@@ -212,7 +225,8 @@ def _terms(networks: Networks, params: Params, key: Key[Array, ""], batch: Batch
         "position": losses.position_loss(both, twice),
         "speed": losses.speed_loss(both, twice),
         "alignment": losses.alignment_loss(s_audio, s_motion),
-        "kl": sum(losses.kl_loss(code) for code in (audio_shared, motion_shared, motion_specific, mapped)),
+        "kl_shared": losses.kl_loss(audio_shared) + losses.kl_loss(motion_shared),
+        "kl_specific": losses.kl_loss(motion_specific) + losses.kl_loss(mapped),
         "relaxed": losses.relaxed_loss(sampled, target, config.relaxed_threshold),
         "sampled_rotation": losses.rotation_loss(rotations[2 * clips : 3 * clips], target_rotations),
         "sampled_speed": losses.speed_loss(sampled, target),

@@ -32,6 +32,10 @@ class Gaussian(NamedTuple):
 LOG_VARIANCE_BOUND = 10.0
 
 
+#: Convolutions of the mapping net.
+MAPPING_LAYERS = 3
+
+
 class GaussianHead(nn.Module):
     """Two-layer heads for mean and log-variance; the latter is kept within +-10 by a scaled tanh."""
 
@@ -99,6 +103,6 @@ class MappingNet(nn.Module):
     def __call__(self, noise: Float[Array, "B T C"]) -> Gaussian:
         c = self.config
         x = Conv1D(c.code_channels, c.kernel_size)(noise)
-        for _ in range(2):
+        for _ in range(MAPPING_LAYERS - 1):
             x = Conv1D(c.code_channels, c.kernel_size)(nn.relu(x))
         return GaussianHead(c.code_channels, c.code_channels)(x)

@@ -13,7 +13,7 @@ from a2g_jax.viz.player.roles import Limb, Roles, find_roles, is_finger, rest_po
 
 #: How an anchor names its place: a point ``(p,)``, between two points ``(p, q, weight)``, or metres along the axes of
 #: a frame ``(frame, x, y, z)``.
-Anchor = tuple[float, ...]
+Anchor = tuple[float | int, ...]
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Shape:
 
     start: Anchor
     end: Anchor
-    start_radius: float
-    end_radius: float
+    start_radius: float | int
+    end_radius: float | int
     tint: str = "body"
     """``body``, ``skin`` (lighter), ``visor`` or ``shoe`` (both darker)."""
     frame: int = -1
@@ -70,7 +70,7 @@ class Body:
 def build_body(skeleton: Skeleton) -> Body:
     """The body to draw for ``skeleton``: a mannequin where arms are found by name, plain capsules otherwise."""
     body = Body(points=[(joint, (0.0, 0.0, 0.0)) for joint in range(skeleton.joints)])
-    ends = {}
+    ends: dict[int, int] = {}
     for joint, offset in skeleton.ends:
         ends.setdefault(joint, body.point(joint, np.asarray(offset)))
     roles = find_roles(skeleton)
@@ -153,8 +153,8 @@ class _Mannequin:
                 body.add(*ends, (0.094 * size, 0.094 * size), frame=pelvis, flat=0.92, shades=True)
         for side, sign in (("left", 1.0), ("right", -1.0)):
             shoulder = roles.arms[side].top
-            inner: Anchor = (chest, sign * 0.045 * size, height + 0.012 * size, -0.01 * size)
-            body.add(inner, (shoulder,), (0.06 * size, 0.056 * size))
+            collar: Anchor = (chest, sign * 0.045 * size, height + 0.012 * size, -0.01 * size)
+            body.add(collar, (shoulder,), (0.06 * size, 0.056 * size))
             self.drawn.update(self._path(shoulder, roles.chest))
         for joint in (roles.chest, *(leg.top for leg in roles.legs.values())):
             self.drawn.update(self._path(joint, roles.pelvis))
@@ -195,8 +195,8 @@ class _Mannequin:
         # A visor around the eyes shows from afar where the head looks: it follows the head's oval at their height.
         turns = np.deg2rad([-62, -31, 0, 31, 62])
         band = [(frame, 0.067 * size * np.sin(t), top - 0.108 * size, 0.076 * size * np.cos(t)) for t in turns]
-        for first, second in zip(band, band[1:], strict=False):
-            body.add(first, second, (0.021 * size, 0.021 * size), tint="visor")
+        for back, fore in zip(band, band[1:], strict=False):
+            body.add(back, fore, (0.021 * size, 0.021 * size), tint="visor")
         nose = [(frame, 0, top - y * size, z * size) for y, z in ((0.128, 0.084), (0.146, 0.095))]
         body.add(nose[0], nose[1], (0.008 * size, 0.014 * size), tint="skin")
 
@@ -263,7 +263,7 @@ class _Mannequin:
         end = self.ends.get(toe) if toe is not None else None
         far = end is not None and np.linalg.norm(body.points[end][1]) > 0.02 * size
         reach = ahead[toe] if toe is not None else 0.0
-        tip: Anchor = (end,) if far else (heel, ball, 1.0 if reach > 0.17 * size else 1.32)
+        tip: Anchor = (end,) if far and end is not None else (heel, ball, 1.0 if reach > 0.17 * size else 1.32)
         body.add((leg.tip,), (heel,), (0.038 * size, 0.037 * size), tint="shoe")
         body.add((heel,), (heel, ball, 0.85), (0.037 * size, 0.041 * size), tint="shoe")
         body.add((heel, ball, 0.8), tip, (0.041 * size, 0.03 * size), tint="shoe")

@@ -15,7 +15,7 @@ class Track:
     """
 
     name: str
-    spans: tuple[tuple[float, float, str, str], ...]
+    spans: tuple[tuple[float | int, float | int, str, str], ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,7 @@ def find_roles(skeleton: Skeleton) -> Roles | None:
 
 
 def split_name(name: str) -> tuple[str, str]:
-    """``("left", "forearm")`` of ``mixamorig:LeftForeArm``, ``forearm.L`` or ``L_ForeArm``; side "" where there is none."""
+    """``("left", "forearm")`` of ``mixamorig:LeftForeArm``, ``forearm.L`` or ``L_ForeArm``; side "" for none."""
     name = name.rsplit(":", 1)[-1]
     camel = _SIDE_CAMEL.match(name)
     if camel:

@@ -62,7 +62,9 @@ class CanvasRenderer {
     const g = this.context, c = figure.capsules, parts = [];
     for (let i = 0; i < figure.count; i++) {
       const o = i * STRIDE, a = onScreen(band, [c[o], c[o + 1], c[o + 2]]), b = onScreen(band, [c[o + 4], c[o + 5], c[o + 6]]);
-      parts.push({ o, a, b, depth: (a[2] + b[2]) / 2 - Math.max(c[o + 3], c[o + 7]) });
+      const r = Math.max(c[o + 3], c[o + 7]);
+      // Small parts lie on large ones (visor, nose, fingers): they come after what they touch.
+      parts.push({ o, a, b, depth: (a[2] + b[2]) / 2 - r - (r < 0.025 ? 0.03 : 0) });
     }
     parts.sort((p, q) => q.depth - p.depth);
     const focal = band.height / (2 * Math.tan(FIELD / 2));

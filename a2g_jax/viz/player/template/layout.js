@@ -22,9 +22,12 @@ function chooseRows(count, spacing, tall, width, height) {
 function arrange(figures, visible, overlay, width, height) {
   const reach = Math.max(...visible.map((i) => figures[i].place.reach));
   const tall = Math.max(...visible.map((i) => figures[i].place.height));
-  const spacing = clamp(1.4 * reach, 0.5 * tall, 1.3 * tall);
+  let spacing = clamp(1.4 * reach, 0.5 * tall, 1.3 * tall);
   const rows = overlay ? 1 : chooseRows(visible.length, spacing, tall, width, height);
   const columns = overlay ? visible.length : Math.ceil(visible.length / rows), phone = width < 640;
+  // Where height decides the size, use the width that is left, within reason.
+  const metre = (height / rows - 80) / (1.1 * tall), fills = (width - 60) / (columns * metre);
+  if (!overlay) spacing = Math.max(spacing, Math.min(fills, 0.95 * tall));
   const bands = [];
   for (let row = 0; row < rows; row++) {
     const members = visible.slice(row * columns, (row + 1) * columns);
@@ -32,6 +35,7 @@ function arrange(figures, visible, overlay, width, height) {
     bands.push({
       x: 0, y, width, height: bottom - y, members, margin: margins(row, rows, phone, overlay),
       slots: members.map((_, k) => (overlay ? [0, 0, 0] : [(k - (members.length - 1) / 2) * spacing, 0, 0])),
+      spacing,
       // The widest row decides the size, so that all rows show bodies equally large.
       frame: { half: overlay ? spacing / 2 : columns * spacing / 2, tall },
       extent: { half: [(overlay ? 0.5 : members.length / 2) * spacing + 0.5, Math.max(reach, 0.7)], height: 1.25 * tall },
@@ -59,7 +63,7 @@ function placeCamera(band, camera) {
     const middle = Math.sqrt(near * far), b = bounds(START.pitch, middle);
     if (b.wide <= room.x && b.high - b.low <= 2 * room.y) far = middle; else near = middle;
   }
-  const fitted = bounds(START.pitch, far), distance = far / camera.zoom;
+  const fitted = bounds(camera.pitch, far), distance = far / camera.zoom;
   const shift = (margin.bottom - margin.top) / band.height - (fitted.high + fitted.low) / 2;
   const target = [camera.panX, frame.tall / 2 + camera.panY * Math.cos(camera.pitch), -camera.panY * Math.sin(camera.pitch)];
   const eye = [target[0], target[1] + distance * Math.sin(camera.pitch), target[2] + distance * Math.cos(camera.pitch)];

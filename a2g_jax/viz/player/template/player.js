@@ -144,6 +144,7 @@ class Player {
     if (this.stale) {
       this.bands = arrange(this.figures, this.shown().map((figure) => figure.index), this.overlay && this.shown().length > 1, width, height);
       this.stale = false;
+      this.resetLabels(width);
     }
     const theme = THEMES[this.scheme.matches ? "dark" : "light"];
     for (const band of this.bands) {
@@ -173,7 +174,7 @@ class Player {
     if (took <= 0) return;
     this.slow = mix(this.slow || 16, Math.min(took, 400), 0.15);
     this.since += 1;
-    if (this.slow > 45 && this.since > 8 && this.renderer.scale > 0.6) { this.renderer.scale *= 0.85; this.since = 0; }
+    if (this.slow > 45 && this.since > 8 && this.renderer.scale > 0.52) { this.renderer.scale *= 0.85; this.since = 0; }
   }
 
   showClock() {
@@ -203,25 +204,30 @@ class Player {
     });
   }
 
+  // Labels stand under the feet; in the overlay they are a legend at the top.
   placeLabels(width) {
+    const legend = this.overlay && this.shown().length > 1, step = Math.min(150, (width - 24) / this.labels.length);
+    for (const band of this.bands) band.members.forEach((index, k) => {
+      const label = this.labels[index], { style } = label;
+      if (legend) { style.transform = `translate(${Math.round(12 + k * step)}px, ${width < 640 ? 52 : 62}px)`; return; }
+      const room = band.members.length > 1 ? clamp(band.metre * band.spacing - 4, 56, 280) : Math.min(width - 20, 400);
+      if (label.room !== room) {
+        style.maxWidth = `${room}px`;
+        Object.assign(label, { room, wide: label.offsetWidth, tall: label.offsetHeight });
+      }
+      const [x, y] = onScreen(band, [band.slots[k][0], 0, 0.22 * band.frame.tall / 1.7]);
+      const left = clamp(x - label.wide / 2, 4, width - label.wide - 4), top = clamp(y + 6, band.y + 4, band.y + band.height - label.tall - 6);
+      style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+    });
+  }
+
+  // After the arrangement changed: which labels there are, and their sizes anew.
+  resetLabels(width) {
     const legend = this.overlay && this.shown().length > 1;
     this.labels.forEach((label, index) => {
-      const band = this.bands.find((one) => one.members.includes(index));
-      label.hidden = !band;
-      if (!band) return;
-      const k = band.members.indexOf(index);
-      if (legend) {
-        label.style.maxWidth = "";
-        const step = Math.min(150, (width - 24) / this.labels.length);
-        label.style.maxWidth = `${step - 4}px`;
-        label.style.transform = `translate(${Math.round(12 + k * step)}px, ${width < 640 ? 52 : 62}px)`;
-        return;
-      }
-      const room = Math.max(56, band.members.length > 1 ? (width - 10) / band.members.length - 6 : width - 20);
-      label.style.maxWidth = `${Math.min(room, 280)}px`;
-      const [x, y] = onScreen(band, [band.slots[k][0], 0, 0.22 * band.frame.tall / 1.7]), wide = label.offsetWidth, tall = label.offsetHeight;
-      const left = clamp(x - wide / 2, 4, width - wide - 4), top = clamp(y + 6, band.y + 4, band.y + band.height - tall - 6);
-      label.style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
+      label.hidden = !this.bands.some((band) => band.members.includes(index));
+      label.room = null;
+      label.style.maxWidth = legend ? `${Math.min(150, (width - 24) / this.labels.length) - 4}px` : "";
     });
   }
 

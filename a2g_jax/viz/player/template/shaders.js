@@ -25,34 +25,11 @@ void capsule(out vec3 place, out vec3 normal) {
 }
 `;
 
-const BODY_VERTEX = CAPSULE + `
-uniform mat4 camera, light;
-uniform int first;
-out vec3 place, normal, lit;
-flat out vec4 paint;
-flat out int part;
-void main() {
-  capsule(place, normal);
-  paint = colour;
-  part = first + gl_InstanceID;
-  vec4 seen = light * vec4(place + normal * 0.008, 1.0);
-  lit = seen.xyz * 0.5 + 0.5;
-  gl_Position = camera * vec4(place, 1.0);
-}`;
-
-const BODY_FRAGMENT = `#version 300 es
-precision highp float;
-precision highp sampler2DShadow;
-uniform sampler2DShadow depths;
-uniform vec3 eye, sun, sunColour, skyColour, bounce;
-uniform vec4 shadeStart[14], shadeEnd[14];  // capsules that keep light of the sky away: centre, radius; centre, part
+// Light of the sky that reaches a place, with capsules of the body in the way.
+const OCCLUSION = `
+uniform vec4 shadeStart[14], shadeEnd[14];  // centre, radius; centre, part
 uniform int shades;
-uniform float alpha, texel, floorHeight;
-in vec3 place, normal, lit;
-flat in vec4 paint;
-flat in int part;
-out vec4 result;
-float occlusion(vec3 n) {
+float occlusion(vec3 place, vec3 n, int part) {
   float open = 1.0;
   for (int i = 0; i < shades; i++) {
     if (int(shadeEnd[i].w) == part) continue;
@@ -66,10 +43,41 @@ float occlusion(vec3 n) {
   }
   return open;
 }
+`;
+
+// For software renderers (`coarse`) the occlusion is found at vertices, not at pixels, and the shadow has no soft edge.
+const bodyVertex = (coarse) => CAPSULE + (coarse ? OCCLUSION : "") + `
+uniform mat4 camera, light;
+uniform int first;
+out vec3 place, normal, lit;
+flat out vec4 paint;
+flat out int part;
+out float sky;
 void main() {
+  capsule(place, normal);
+  paint = colour;
+  part = first + gl_InstanceID;
+  sky = ${coarse ? "occlusion(place, normal, part)" : "1.0"};
+  vec4 seen = light * vec4(place + normal * 0.008, 1.0);
+  lit = seen.xyz * 0.5 + 0.5;
+  gl_Position = camera * vec4(place, 1.0);
+}`;
+
+const bodyFragment = (coarse) => `#version 300 es
+precision highp float;
+precision highp sampler2DShadow;
+uniform sampler2DShadow depths;
+uniform vec3 eye, sun, sunColour, skyColour, bounce;
+uniform float alpha, texel, floorHeight;
+in vec3 place, normal, lit;
+flat in vec4 paint;
+flat in int part;
+in float sky;
+out vec4 result;
+${coarse ? "" : OCCLUSION}void main() {
   vec3 n = normalize(normal), v = normalize(eye - place);
   if (paint.a < 0.0) { result = vec4(pow(paint.rgb, vec3(1.0 / 2.2)), alpha); return; }
-  float open = occlusion(n);
+  float open = ${coarse ? "sky" : "occlusion(place, n, part)"};
   // The ground hides the lower half of the sky from what is close to it.
   float low = clamp((place.y - floorHeight) / 0.35, 0.0, 1.0);
   open *= mix(mix(0.45, 1.0, low), 1.0, clamp(n.y * 0.5 + 0.5, 0.0, 1.0));
@@ -77,9 +85,9 @@ void main() {
   float sunlight = 0.0;
   if (face > 0.0) {
     float bias = -0.0012;
-    for (int i = 0; i < 4; i++) {
-      vec2 o = vec2(i < 2 ? -0.9 : 0.9, (i & 1) == 0 ? -0.9 : 0.9);
-      sunlight += 0.25 * texture(depths, vec3(lit.xy + o * texel, lit.z + bias));
+    for (int i = 0; i < ${coarse ? 1 : 4}; i++) {
+      vec2 o = ${coarse ? "vec2(0.0)" : "vec2(i < 2 ? -0.9 : 0.9, (i & 1) == 0 ? -0.9 : 0.9)"};
+      sunlight += ${coarse ? "1.0" : "0.25"} * texture(depths, vec3(lit.xy + o * texel, lit.z + bias));
     }
     sunlight *= face;
   }

@@ -22,7 +22,7 @@ class WebGLRenderer {
     this.gl = gl;
     this.software = software;
     this.name = "webgl2";
-    this.scale = 1;
+    this.scale = software ? 0.75 : 1;
     this.build();
     canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); this.lost = true; });
     canvas.addEventListener("webglcontextrestored", () => { this.lost = false; this.build(); });
@@ -31,13 +31,14 @@ class WebGLRenderer {
   build() {
     const gl = this.gl;
     this.programs = {
-      body: this.program(BODY_VERTEX, BODY_FRAGMENT),
+      body: this.program(bodyVertex(false), bodyFragment(false)),
+      ...(this.software ? { coarse: this.program(bodyVertex(true), bodyFragment(true)) } : {}),
       depth: this.program(DEPTH_VERTEX, EMPTY_FRAGMENT),
       spot: this.program(SPOT_VERTEX, SPOT_FRAGMENT),
       blur: this.program(BLUR_VERTEX, BLUR_FRAGMENT),
       ground: this.program(GROUND_VERTEX, GROUND_FRAGMENT),
     };
-    this.meshes = [this.mesh(7, 20), this.mesh(3, 10), this.mesh(4, 12), this.mesh(2, 6)];
+    this.meshes = [this.mesh(7, 20), this.mesh(3, 10), this.mesh(3, 10), this.mesh(1, 6)];
     this.empty = gl.createVertexArray();
     this.buffer = gl.createBuffer();
     this.vertexArrays = this.meshes.map((mesh) => this.vertexArray(mesh));
@@ -190,7 +191,7 @@ class WebGLRenderer {
     this.drawGround(scene, band, area);
 
     gl.enable(gl.DEPTH_TEST); gl.depthMask(true);
-    const { program, at } = this.programs.body;
+    const { program, at } = this.coarse ? this.programs.coarse : this.programs.body;
     gl.activeTexture(gl.TEXTURE0); gl.bindTexture(gl.TEXTURE_2D, this.depthMap);
     band.figures.forEach((figure, k) => {
       const ghost = scene.overlay && k > 0;
@@ -211,8 +212,8 @@ class WebGLRenderer {
       gl.uniform1i(at.depths, 0);
       gl.uniform3fv(at.eye, band.eye); gl.uniform3fv(at.sun, SUN);
       gl.uniform3fv(at.sunColour, theme.sun); gl.uniform3fv(at.skyColour, theme.sky); gl.uniform3fv(at.bounce, theme.bounce);
-      gl.uniform1f(at.alpha, ghost ? 0.55 : 1); gl.uniform1f(at.texel, 1 / SHADOW_SIZE[0]); gl.uniform1f(at.floorHeight, 0);
-      const shades = this.coarse ? figure.shaders.slice(0, 6) : figure.shaders, starts = new Float32Array(56), ends = new Float32Array(56);
+      gl.uniform1f(at.alpha, ghost ? Math.max(0.32, 1 / (k + 1)) : 1); gl.uniform1f(at.texel, 1 / SHADOW_SIZE[0]); gl.uniform1f(at.floorHeight, 0);
+      const shades = figure.shaders, starts = new Float32Array(56), ends = new Float32Array(56);
       shades.forEach((part, i) => {
         const o = part * STRIDE, c = figure.capsules;
         starts.set([c[o], c[o + 1], c[o + 2], 0.5 * (c[o + 3] + c[o + 7]) * Math.sqrt(c[o + 11])], 4 * i);

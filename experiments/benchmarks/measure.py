@@ -1,0 +1,149 @@
+"""Timing of one contender in a process of its own, and tables and JSON of several."""
+
+import datetime
+import importlib.metadata
+import json
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+RESULTS = Path(__file__).parent / "results"
+THREADS = 2
+#: Last line of a contender's output: its figures, after this mark.
+_MARK = "FIGURES "
+
+
+def limit_threads() -> None:
+    """Two threads for whichever library is imported next; call it before JAX, NumPy or PyTorch are."""
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ[name] = str(THREADS)
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    if hasattr(os, "sched_setaffinity"):
+        # XLA has as many threads as the process has cores.
+        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
+
+
+def _busy_seconds() -> float:
+    """CPU seconds that all processes together have used since boot, on the cores this process may use."""
+    cores = {f"cpu{core}" for core in os.sched_getaffinity(0)}
+    total = 0
+    for line in Path("/proc/stat").read_text().splitlines():
+        name, *ticks = line.split()
+        if name in cores:
+            user, nice, system, _idle, _wait, interrupt, soft, steal = (int(tick) for tick in ticks[:8])
+            total += user + nice + system + interrupt + soft + steal
+    return total / os.sysconf("SC_CLK_TCK")
+
+
+class Stopwatch:
+    """Share of the cores that other processes took while it ran; ``None`` where Linux's /proc is missing."""
+
+    def __init__(self) -> None:
+        self._linux = Path("/proc/stat").exists()
+        self._wall, self._own = time.perf_counter(), time.process_time()
+        self._busy = _busy_seconds() if self._linux else 0.0
+
+    def others(self) -> float | None:
+        """Between 0 and 1."""
+        if not self._linux:
+            return None
+        wall, own = time.perf_counter() - self._wall, time.process_time() - self._own
+        busy = _busy_seconds() - self._busy
+        return max(0.0, busy - own) / (wall * len(os.sched_getaffinity(0)))
+
+
+def measure(call: Callable[[], Any], repeats: int, warm_up: int = 2) -> dict[str, Any]:
+    """Seconds of calls that wait for their results, after the first one (timed apart) and some more to warm up."""
+    before = peak_megabytes()
+    start = time.perf_counter()
+    call()
+    first = time.perf_counter() - start
+    for _ in range(warm_up):
+        call()
+    watch = Stopwatch()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return {
+        "median_s": statistics.median(times),
+        "min_s": min(times),
+        "max_s": max(times),
+        "first_s": first,
+        "repeats": repeats,
+        "others_share": watch.others(),
+        "before_mb": before,
+    }
+
+
+def peak_megabytes() -> float:
+    """Largest resident memory of this process so far."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    # Bytes on macOS, kibibytes on Linux.
+    return peak / 1e6 if sys.platform == "darwin" else peak * 1024 / 1e6
+
+
+def report(figures: dict[str, Any]) -> None:
+    """Hand figures to the process that started this one."""
+    print(_MARK + json.dumps({**figures, "peak_mb": peak_megabytes()}), flush=True)
+
+
+def run_alone(module: str, contender: str, arguments: list[str]) -> dict[str, Any]:
+    """Run one contender of a benchmark module in a fresh process and return its figures, or how it failed."""
+    command = [sys.executable, "-m", module, *arguments, "--contender", contender]
+    print(f"{contender} ...", file=sys.stderr, flush=True)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = [line for line in done.stdout.splitlines() if line.startswith(_MARK)]
+    if done.returncode != 0 or not lines:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        return {"failed": f"exit code {done.returncode}: {last}"}
+    return json.loads(lines[-1].removeprefix(_MARK))
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 100 else f"{value:.0f}"
+    return "-" if value is None else str(value)
+
+
+def print_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    """Rows as a Markdown table; ``columns`` maps keys to headings."""
+    print("| " + " | ".join(columns.values()) + " |")
+    print("|" + " --- |" * len(columns))
+    for row in rows:
+        print("| " + " | ".join(_cell(row.get(key)) for key in columns) + " |")
+        if "failed" in row:
+            print(f"\n{row['contender']} failed: {row['failed']}\n")
+
+
+def write_results(name: str, settings: dict[str, Any], rows: list[dict[str, Any]], out: Path | None) -> Path:
+    """JSON with everything needed to repeat the measurement."""
+    versions = {}
+    for package in ("a2g_jax", "jax", "jaxlib", "flax", "optax", "numpy", "torch"):
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            versions[package] = None
+    path = out or RESULTS / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    values = {
+        "command": " ".join(["python -m", f"experiments.benchmarks.{name}", *sys.argv[1:]]),
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "cores": os.cpu_count(),
+        "threads": THREADS,
+        "versions": versions,
+        "settings": settings,
+        "rows": rows,
+    }
+    path.write_text(json.dumps(values, indent=1) + "\n")
+    return path

@@ -1,0 +1,122 @@
+"""Generation: exact lengths, seeds, windows, and roots that stand."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from a2g_jax.data.talker.body import TALKER_SKELETON
+from a2g_jax.data.talker.recordings import talk
+from a2g_jax.errors import InputError
+from a2g_jax.generation import generate as module
+from a2g_jax.generation.deliver import check_formats
+from a2g_jax.generation.generate import Generator
+from a2g_jax.generation.root import plant_feet
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_euler
+from a2g_jax.training.evaluation import collect_summary
+from a2g_jax.training.run import Run
+
+_SPEECH = talk(6.0, 21).audio
+
+
+@pytest.fixture(scope="module")
+def small_window():
+    """Windows of 128 frames, so that short audio already has several."""
+    before, module.WINDOW = module.WINDOW, 128
+    yield
+    module.WINDOW = before
+
+
+@pytest.fixture
+def generator(toy_run_config, toy_corpus, small_window):
+    config = toy_run_config()
+    config = dataclasses.replace(config, model_config=dataclasses.replace(config.model_config, redraw_frames=32))
+    model = config.build()
+    params = jax.jit(model.init)(jax.random.key(0))
+    summary = collect_summary(model, params, toy_corpus, config)
+    return Generator(Run(config, jax.device_get(params), summary, 0))
+
+
+@pytest.mark.parametrize("samples", [1, 533, 16000, 70001])
+def test_frames_are_seconds_times_fps(generator, samples):
+    audio = np.resize(_SPEECH, samples).astype(np.float32)
+    expected = round(samples / 16000 * 30)
+    if expected == 0:
+        with pytest.raises(InputError, match="less than a frame"):
+            generator.generate(audio, 1)
+    else:
+        assert generator.generate(audio, 1)[0].frames == expected
+
+
+def test_seeds(generator):
+    first = generator.generate(_SPEECH, 4, seed=3)
+    alone = generator.generate(_SPEECH, 1, seed=3)[0]
+    np.testing.assert_array_equal(first[0].rotations, alone.rotations)
+    np.testing.assert_array_equal(first[0].root, alone.root)
+    assert np.abs(first[0].rotations - first[1].rotations).max() > 1e-3
+    other = generator.generate(_SPEECH, 1, seed=4)[0]
+    assert np.abs(other.rotations - alone.rotations).max() > 1e-3
+
+
+def test_windows_leave_no_seam(generator):
+    """The same motion comes out of one window over the whole audio."""
+    windowed = generator.generate(_SPEECH, 1, seed=5)[0]
+    before, module.WINDOW = module.WINDOW, 256
+    try:
+        whole = Generator(generator.run).generate(_SPEECH, 1, seed=5)[0]
+    finally:
+        module.WINDOW = before
+    assert windowed.frames == 180 > 128
+    np.testing.assert_allclose(windowed.rotations, whole.rotations, atol=1e-5)
+
+
+def test_no_new_length_compiles_anew(generator):
+    generator.generate(_SPEECH, 1)
+    compiled = generator._sample._cache_size()
+    for seconds in (1.0, 2.5, 5.9):
+        generator.generate(_SPEECH[: int(seconds * 16000)], 1)
+    assert generator._sample._cache_size() == compiled == 1
+    assert generator._condition._cache_size() == 1
+
+
+def test_rotations_are_rotations(generator):
+    rotations = generator.generate(_SPEECH, 1)[0].rotations
+    identity = rotations @ np.swapaxes(rotations, -1, -2)
+    np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-5)
+    np.testing.assert_allclose(np.linalg.det(rotations), 1.0, atol=1e-5)
+
+
+def test_feet_stay_when_hips_sway():
+    frames = 90
+    tilt = 0.05 * np.sin(np.arange(frames) / 10)
+    rotations = np.tile(np.eye(3, dtype=np.float32), (frames, 22, 1, 1))
+    roll = np.asarray(matrix_from_euler(jnp.stack([jnp.zeros(frames), jnp.zeros(frames), jnp.asarray(tilt)], 1), "XYZ"))
+    rotations[:, 0] = roll
+    rotations[:, [1, 2]] = np.swapaxes(roll, -1, -2)[:, None]
+    motion = Motion(rotations, np.zeros((frames, 3), np.float32), TALKER_SKELETON, 30.0)
+    mean_root = np.array([0.3, 0.9, -0.2], np.float32)
+    planted = plant_feet(motion, mean_root, np.tile(np.eye(3, dtype=np.float32), (22, 1, 1)))
+    ankles = planted.positions()[:, [7, 8]].mean(axis=1)
+    assert np.abs(ankles - ankles.mean(axis=0)).max() < 2e-3
+    # Under the mean pose: x and z of the mean root do not matter, its height does.
+    assert planted.positions()[:, 0, 1].mean() == pytest.approx(0.9, abs=0.01)
+    assert abs(planted.positions()[:, 0, 0].mean()) < 0.01
+
+
+def test_skeletons_without_ankles_stand_still():
+    from a2g_jax.geometry.skeleton import Skeleton
+
+    skeleton = Skeleton(np.ones((2, 3), np.float32), ("tail", "tip"), (-1, 0))
+    motion = Motion(np.tile(np.eye(3, dtype=np.float32), (5, 2, 1, 1)), np.zeros((5, 3), np.float32), skeleton, 30.0)
+    root = plant_feet(motion, np.array([1.0, 2.0, 3.0], np.float32), np.asarray(motion.rotations)[0]).root
+    np.testing.assert_array_equal(root, np.tile([0.0, 2.0, 0.0], (5, 1)))
+
+
+def test_formats():
+    assert check_formats("bvh, HTML") == ("bvh", "html")
+    for text in ("", "fbx", "bvh;npz"):
+        with pytest.raises(InputError, match="--formats"):
+            check_formats(text)

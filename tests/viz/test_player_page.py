@@ -1,0 +1,139 @@
+import base64
+import io
+import json
+import re
+import wave
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from a2g_jax.data.recording import Word
+from a2g_jax.errors import InputError
+from a2g_jax.viz.player import Figure, Track, write_page
+from a2g_jax.viz.player.encode import decode_positions, encode_positions
+from a2g_jax.viz.player.page import fill_template, script_json
+from tests.viz.figures_for_tests import tone, waving
+
+
+def page_data(page: str) -> dict:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    return json.loads(found.group(1))
+
+
+def write(folder: Path, **changes) -> str:
+    given = {
+        "figures": [Figure(waving(), "Recorded", "note"), Figure(waving(25, 15.0), "Sample")],
+        "audio": tone(2.0),
+        "sample_rate": 16000,
+        "title": "A title",
+    }
+    given.update(changes)
+    write_page(folder / "page.html", **given)
+    return (folder / "page.html").read_text(encoding="utf-8")
+
+
+def test_page_names_no_address_outside_itself(tmp_path):
+    page = write(tmp_path, words=[Word("hello", 0.1, 0.4)], subtitle="sub", footer="foot")
+    without_data = re.sub(r'"data":"[A-Za-z0-9+/=]*"|"audio":"[A-Za-z0-9+/=]*"', "", page)
+    assert not re.search(r"https?:|wss?://|ftp://|//[a-z0-9-]+\.[a-z]{2,}", without_data, re.IGNORECASE)
+    assert not re.search(r"<link[^>]*href=\"(?!data:)|\bsrc=|@import|url\(", without_data)
+    assert "default-src 'none'" in page
+
+
+def test_positions_survive_within_half_a_millimetre(tmp_path):
+    motions = [waving(), waving(25, 15.0)]
+    data = page_data(write(tmp_path, figures=[Figure(motion, "x") for motion in motions]))
+    for motion, figure in zip(motions, data["figures"], strict=True):
+        decoded = decode_positions(figure, figure["points"])
+        assert decoded.shape == (motion.frames, figure["points"], 3)
+        assert figure["fps"] == motion.fps
+        np.testing.assert_allclose(decoded[:, :22], motion.positions(), atol=5e-4)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 30.0), st.floats(-1e3, 1e3))
+def test_quantisation_error_is_below_half_a_millimetre(seed, reach, shift):
+    points = np.random.default_rng(seed).uniform(-reach, reach, (5, 4, 3)) + shift
+    encoded = encode_positions(points, "any")
+    assert np.abs(decode_positions(encoded, 4) - points).max() <= 5e-4
+
+
+def test_audio_is_the_same_to_16_bits(tmp_path):
+    audio = np.concatenate([tone(0.5), np.float32([1.0, -1.0, 1.5, -2.0, 0.0])])
+    data = page_data(write(tmp_path, audio=audio))
+    with wave.open(io.BytesIO(base64.b64decode(data["audio"]))) as sound:
+        assert (sound.getframerate(), sound.getnchannels(), sound.getsampwidth()) == (16000, 1, 2)
+        samples = np.frombuffer(sound.readframes(sound.getnframes()), "<i2")
+    np.testing.assert_array_equal(samples, np.round(np.clip(audio, -1, 1) * 32767))
+    assert data["duration"] == pytest.approx(len(audio) / 16000)
+
+
+def test_without_audio_the_longest_motion_sets_the_length(tmp_path):
+    data = page_data(write(tmp_path, audio=np.zeros(0, np.float32)))
+    assert data["audio"] == ""
+    assert data["duration"] == pytest.approx(2.0)
+
+
+def test_hostile_text_stays_text(tmp_path):
+    evil = "</script><script>alert(1)</script><!-- {{data}} \u2028 & \"' \ud800"
+    track = Track(evil, ((0.0, 1.0, evil, evil),))
+    page = write(
+        tmp_path,
+        figures=[Figure(waving(), evil, evil, (track,))],
+        title=evil.replace("\ud800", ""),
+        subtitle="<img src=x onerror=alert(1)>",
+        words=[Word(evil, 0.0, 0.5)],
+    )
+    assert "alert(1)</script>" not in page
+    assert "<img" not in page
+    assert page.count("</script>") == 2
+    figure = page_data(page)["figures"][0]
+    assert figure["label"] == figure["note"] == evil
+    assert figure["tracks"] == [{"name": evil, "spans": [[0.0, 1.0, evil, evil]]}]
+
+
+@given(st.text())
+def test_script_json_is_json_without_markup(text):
+    written = script_json({"text": text})
+    assert not set("<>&") & set(written)
+    written.encode("utf-8")
+    assert json.loads(written) == {"text": text}
+
+
+def test_template_values_are_not_filled_again():
+    assert fill_template("{{a}} {{b}}", {"a": "{{b}}", "b": "2"}) == "{{b}} 2"
+
+
+def test_five_minutes_of_samples_stay_small(tmp_path):
+    write(tmp_path, figures=[Figure(waving(1800), str(k)) for k in range(5)], audio=tone(60.0))
+    assert (tmp_path / "page.html").stat().st_size < 5.2e6
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"figures": []}, "at least one"),
+        ({"audio": np.float32([0.0, np.nan])}, "sample 1"),
+        ({"sample_rate": 0}, "sample rate"),
+        ({"figures": [Figure(waving().clip(0, 0), "empty")]}, "'empty'.*no frames"),
+        ({"figures": [Figure(replace(waving(), fps=0.0), "still")]}, "'still'.*frames per second"),
+        ({"figures": [Figure(replace(waving(), root=np.full((60, 3), np.inf, np.float32)), "far")]}, "'far', frame 0"),
+        (
+            {
+                "figures": [
+                    Figure(replace(waving(), root=np.linspace(0, 100, 180, dtype=np.float32).reshape(60, 3)), "cm")
+                ]
+            },
+            "metres",
+        ),
+    ],
+)
+def test_bad_input_is_named_and_leaves_no_file(tmp_path, change, message):
+    with pytest.raises(InputError, match=message):
+        write(tmp_path, **change)
+    assert list(tmp_path.iterdir()) == []
