@@ -33,7 +33,7 @@ DEMO_MINUTES = 20.0
 
 def _cache_compilations() -> None:
     """Keep compiled programs between runs; XLA compiles for seconds what it runs in milliseconds."""
-    if jax.config.jax_compilation_cache_dir is None:
+    if jax.config.values.get("jax_compilation_cache_dir") is None:
         home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
         jax.config.update("jax_compilation_cache_dir", str(home / "a2g_jax" / "xla"))
 

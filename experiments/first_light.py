@@ -4,8 +4,8 @@
 
 On the generated corpus (its test split, never trained on): reconstruction beside the mean pose; the distance between
 samples for one audio beside that of the true other motions; agreement of wrist-speed peaks with the audio's energy
-peaks beside that with other recordings' audio. On real speech: the same agreement beside the motion shifted by 1 to 5 s, and
-the speed of the wrists in pauses beside that in speech. RUN may be 'demo' for the shipped weights.
+peaks beside that with other recordings' audio. On real speech: the same agreement beside the motion shifted by 1 to
+5 s, and the speed of the wrists in pauses beside that in speech. RUN may be 'demo' for the shipped weights.
 """
 
 import argparse

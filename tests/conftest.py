@@ -6,7 +6,7 @@ from pathlib import Path
 # Before JAX starts: two virtual devices find sharding mistakes, and one compilation cache serves the whole session.
 os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-# Each training in a test is a new function to JAX, though the program is the same: compile it once, for subprocesses too.
+# Each training is a new function to JAX though the program is the same: compile it once, for subprocesses too.
 _CACHE = Path(__file__).parents[1] / ".cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")

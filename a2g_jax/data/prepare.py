@@ -196,7 +196,7 @@ def _finish_arrays(work: Path, entries: list[Entry], bands: int, joints: int) ->
 
 def _write_statistics(work: Path, entries: list[Entry], splits: Splits) -> None:
     """Means and standard deviations over the training split only."""
-    values = {}
+    values: dict[str, Any] = {}
     for name in ARRAYS:
         key = name.removesuffix(".npy")
         array = np.load(work / name, mmap_mode="r", allow_pickle=False)

@@ -1,6 +1,7 @@
 """Mean and standard deviation of features, and normalising by them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import numpy as np
@@ -14,11 +15,11 @@ class Statistics:
     mean: Float[Array | np.ndarray, "*feature"]
     std: Float[Array | np.ndarray, "*feature"]
 
-    def normalise(self, x: Float[Array | np.ndarray, "..."]) -> Float[Array | np.ndarray, "..."]:
-        """``(x - mean) / std`` over the trailing axes."""
+    def normalise(self, x: Float[Array | np.ndarray, "..."]) -> Any:
+        """``(x - mean) / std`` over the trailing axes; NumPy stays NumPy."""
         return (x - self._like(self.mean, x)) / self._like(self.std, x)
 
-    def denormalise(self, x: Float[Array | np.ndarray, "..."]) -> Float[Array | np.ndarray, "..."]:
+    def denormalise(self, x: Float[Array | np.ndarray, "..."]) -> Any:
         """Inverse of :meth:`normalise`."""
         return x * self._like(self.std, x) + self._like(self.mean, x)
 

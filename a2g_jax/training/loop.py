@@ -184,7 +184,7 @@ def _stop_requested() -> Iterator[threading.Event]:
 
     def stop(number: int, _frame: Any) -> None:
         event.set()
-        signal.signal(number, before[number])
+        signal.signal(number, before[signal.Signals(number)])
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

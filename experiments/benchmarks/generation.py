@@ -142,7 +142,6 @@ def _twin(config: Any, options: argparse.Namespace) -> dict[str, Any]:
     @torch.inference_mode()
     def positions(samples: int) -> None:
         shared = encode(features)
-        # One after another: that was faster than one batch of all.
         for _ in range(samples):
             row = torch.randint(SUMMARY_CLIPS, (1,))
             decode(*shared, row, torch.randn(3, 1, code, options.frames)).numpy()

@@ -5,6 +5,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from flax import linen as nn
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.geometry.kinematics import joint_positions
@@ -52,44 +53,38 @@ class Networks:
 
     def encode_audio(self, params: Params, audio: Float[Array, "B T bands"], dropout_key=None) -> Gaussian:
         """S_A."""
-        rngs = None if dropout_key is None else {"dropout": dropout_key}
-        return self.modules[0].apply(
-            {"params": params["audio_encoder"]}, audio, deterministic=dropout_key is None, rngs=rngs
-        )
+        return _apply(self.modules[0], params["audio_encoder"], dropout_key, audio)
 
     def encode_motion(
         self, params: Params, pose: Float[Array, "B T J 6"], dropout_key=None
     ) -> tuple[Gaussian, Gaussian]:
         """S_M and I_M."""
-        if self.config.normalise_pose:
-            pose = self.data.pose_statistics.normalise(pose)
-        rngs = None if dropout_key is None else {"dropout": dropout_key}
-        return self.modules[1].apply(
-            {"params": params["motion_encoder"]},
-            pose.reshape(*pose.shape[:2], -1),
-            deterministic=dropout_key is None,
-            rngs=rngs,
-        )
+        seen = self.data.pose_statistics.normalise(pose) if self.config.normalise_pose else pose
+        return _apply(self.modules[1], params["motion_encoder"], dropout_key, seen.reshape(*pose.shape[:2], -1))
 
     def decode(
         self, params: Params, shared: Float[Array, "B T C"], specific: Float[Array, "B T C"], dropout_key=None
     ) -> Float[Array, "B T J 6"]:
         """Motion of a full code, as 6D vectors that Gram-Schmidt makes rotations."""
-        rngs = None if dropout_key is None else {"dropout": dropout_key}
-        flat = self.modules[2].apply(
-            {"params": params["decoder"]}, shared, specific, deterministic=dropout_key is None, rngs=rngs
-        )
+        flat = _apply(self.modules[2], params["decoder"], dropout_key, shared, specific)
         pose = flat.reshape(*flat.shape[:2], -1, 6)
         return self.data.pose_statistics.denormalise(pose) if self.config.normalise_pose else pose
 
     def map_noise(self, params: Params, noise: Float[Array, "B T C"]) -> Gaussian:
         """I_R."""
-        return self.modules[3].apply({"params": params["mapping_net"]}, noise)
+        mapping: Any = self.modules[3].apply({"params": params["mapping_net"]}, noise)
+        return mapping
 
     def positions(self, rotations: Float[Array, "B T J 3 3"]) -> Float[Array, "B T J 3"]:
         """Joint positions in metres, the root at the origin."""
         skeleton = self.data.skeleton
         return joint_positions(rotations, jnp.asarray(skeleton.offsets), skeleton.parents)
+
+
+def _apply(module: nn.Module, params: Params, dropout_key: Key[Array, ""] | None, *inputs: Array) -> Any:
+    """A network's output; dropout acts only when given a key."""
+    rngs = None if dropout_key is None else {"dropout": dropout_key}
+    return module.apply({"params": params}, *inputs, deterministic=dropout_key is None, rngs=rngs)
 
 
 def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
