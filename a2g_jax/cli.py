@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from a2g_jax import __version__
 from a2g_jax.errors import A2GError
@@ -13,7 +13,10 @@ MODEL_NAMES = ("audio2gestures",)
 
 
 class _Parser(argparse.ArgumentParser):
-    """Bad usage is one line on standard error and status 2."""
+    """Bad usage is one line on standard error and status 2; flags are written out, for scripts' sake."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"a2g: {message} (see '{self.prog} --help')\n")

@@ -1,0 +1,48 @@
+"""The writer's files open in Blender, where there is one."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from a2g_jax.data.talker.recordings import talk
+from a2g_jax.io.bvh import write_bvh
+
+_SCRIPT = """
+import bpy, json, sys
+bpy.ops.import_anim.bvh(filepath={path!r}, global_scale=0.01, axis_forward='-Z', axis_up='Y', use_fps_scale=False,
+                        update_scene_fps=True, update_scene_duration=True, rotate_mode='NATIVE')
+rig = bpy.context.object
+heads = {{}}
+for frame in {frames!r}:
+    bpy.context.scene.frame_set(frame + 1)
+    heads[frame] = {{bone.name: list(rig.matrix_world @ bone.head) for bone in rig.pose.bones}}
+scene = bpy.context.scene
+print("HEADS" + json.dumps({{"fps": scene.render.fps, "last": scene.frame_end, "heads": heads}}))
+"""
+
+
+@pytest.mark.slow
+def test_blender_sees_the_same_joints(tmp_path):
+    blender = shutil.which("blender")
+    if blender is None:
+        pytest.skip("no Blender here")
+    motion = talk(4.0, 1).motion
+    path = tmp_path / "motion.bvh"
+    write_bvh(path, motion)
+    frames = [0, 40, 119]
+    script = _SCRIPT.format(path=str(path), frames=frames)
+    shown = subprocess.run([blender, "-b", "--python-expr", script], capture_output=True, text=True, timeout=240)
+    line = next((line for line in shown.stdout.splitlines() if line.startswith("HEADS")), None)
+    assert line is not None, shown.stdout[-2000:] + shown.stderr[-2000:]
+    seen = json.loads(line.removeprefix("HEADS"))
+    assert seen["fps"] == 30
+    assert seen["last"] >= 119
+    positions = motion.positions()
+    for frame in frames:
+        for joint, name in enumerate(motion.skeleton.names):
+            x, y, z = seen["heads"][str(frame)][name]
+            # Blender is Z-up.
+            np.testing.assert_allclose([x, z, -y], positions[frame, joint], atol=1e-3)
