@@ -11,7 +11,10 @@ from a2g_jax.data.talker.recordings import talk
 from a2g_jax.io.bvh import write_bvh
 
 _SCRIPT = """
-import bpy, json, sys
+import bpy, builtins, json
+from io_anim_bvh import import_bvh
+# Blender 3.4 opens BVH files in mode 'rU', which Python 3.11 no longer knows.
+import_bvh.open = lambda path, mode="r": builtins.open(path, mode.replace("U", ""))
 bpy.ops.import_anim.bvh(filepath={path!r}, global_scale=0.01, axis_forward='-Z', axis_up='Y', use_fps_scale=False,
                         update_scene_fps=True, update_scene_duration=True, rotate_mode='NATIVE')
 rig = bpy.context.object
