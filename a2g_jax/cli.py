@@ -2,11 +2,11 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
-from a2g_jax.errors import A2GError
+from a2g_jax.errors import A2GError, Interrupted
 
 #: Names of the models; the registry itself is imported late, because it costs seconds.
 MODEL_NAMES = ("audio2gestures",)
@@ -22,36 +22,39 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"a2g: {message} (see '{self.prog} --help')\n")
 
 
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a number above 0; got {text}")
-    return value
+def _number(kind: Callable[[str], Any], low: float, high: float, meaning: str) -> Callable[[str], Any]:
+    """A converter that refuses, in words, what is not a number between ``low`` and ``high``."""
+
+    def convert(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = float("nan")
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"expected {meaning}; got {text!r}")
+        return value
+
+    return convert
 
 
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected 1 or more; got {text}")
-    return value
-
-
-def _seed(text: str) -> int:
-    value = int(text)
-    if not 0 <= value < 2**31:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 0 to 2147483647; got {text}")
-    return value
+_positive = _number(float, 1e-6, 1e9, "a number above 0")
+_count = _number(int, 1, 1000, "a whole number from 1 to 1000")
+_seed = _number(int, 0, 2**31 - 1, "a whole number from 0 to 2147483647")
 
 
 def make_parser() -> argparse.ArgumentParser:
     """The command line of all subcommands."""
     parser = _Parser(prog="a2g", description="Speech audio to many different, natural co-speech gestures.")
+    parser.add_argument("--debug", action="store_true", help="show a traceback when something goes wrong")
     parser.add_argument("--version", action="version", version=f"a2g_jax {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
 
     def command(name: str, text: str) -> argparse.ArgumentParser:
         sub = commands.add_parser(name, help=text, description=text)
-        sub.add_argument("--debug", action="store_true", help="show a traceback when something goes wrong")
+        # Also after the command; without a default of its own it does not undo the one before it.
+        sub.add_argument(
+            "--debug", action="store_true", default=argparse.SUPPRESS, help="show a traceback when something goes wrong"
+        )
         return sub
 
     def sampling(sub: argparse.ArgumentParser) -> None:
@@ -71,13 +74,12 @@ def make_parser() -> argparse.ArgumentParser:
     prepare.add_argument("reader", choices=("talker", "folder"), help="talker: generate; folder: WAV and BVH pairs")
     prepare.add_argument("source", nargs="?", help="the folder of recordings (for 'folder')")
     prepare.add_argument("--out", required=True, metavar="CORPUS", help="folder to make")
-    prepare.add_argument("--minutes", type=_positive, default=30.0, help="minutes of talk to generate (default: 30)")
+    prepare.add_argument("--minutes", type=_positive, help="minutes of talk to generate (default: 30)")
     prepare.add_argument("--seed", type=_seed, default=0, help="of the generated talk and of the splits (default: 0)")
     prepare.add_argument("--fps", type=_positive, default=30.0, help="frames per second (default: 30)")
     prepare.add_argument(
         "--joints",
         choices=("body", "all"),
-        default="body",
         help="body: the 22 body joints, if they can be found by name; all: the rig as it is (default: body)",
     )
 
@@ -109,17 +111,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from a2g_jax import commands  # late: importing JAX takes seconds, and --help should not
 
         getattr(commands, f"run_{options.command}")(options, extra)
-    except A2GError as error:
-        if options.debug:
-            raise
-        print(f"a2g: {' '.join(str(error).split())}", file=sys.stderr)
-        from a2g_jax.training.loop import Interrupted
-
-        return 130 if isinstance(error, Interrupted) else 2
     except KeyboardInterrupt:
         print("a2g: interrupted", file=sys.stderr)
         return 130
+    except Exception as error:
+        if options.debug:
+            raise
+        status, line = _explain(error)
+        print(f"a2g: {' '.join(line.split())}", file=sys.stderr)
+        return status
     return 0
+
+
+def _explain(error: Exception) -> tuple[int, str]:
+    """Exit status and message for an error."""
+    if isinstance(error, Interrupted):
+        return 130, str(error)
+    if isinstance(error, A2GError):
+        return 2, str(error)
+    if isinstance(error, OSError):
+        return (
+            2,
+            f"{error.filename or 'a file'}: cannot be used ({error.strerror or error}); check path and free space.",
+        )
+    return 1, f"unexpected {type(error).__name__}: {str(error)[:200]}; run again with --debug and report what it shows."
 
 
 if __name__ == "__main__":

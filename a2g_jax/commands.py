@@ -3,27 +3,24 @@
 import argparse
 import dataclasses
 import os
-import sys
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import jax
-from tqdm import tqdm
 
 from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.folder import find_pairs, read_pair
-from a2g_jax.data.prepare import Prepared, prepare_recording, write_corpus
-from a2g_jax.data.talker.recordings import cast, talk
+from a2g_jax.data.make import prepare_folder, prepare_talker
+from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation.deliver import check_formats, deliver
 from a2g_jax.io.audio import read_audio
 from a2g_jax.models import find_model
+from a2g_jax.progress import progress_bar
 from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import Run, RunConfig, load_run
+from a2g_jax.training.run import Run, RunConfig, demo_run, load_run
 
 #: The demo's own speech: who says it, for how long, and from which seed (one that no training corpus uses).
 DEMO_SPEECH: dict[str, Any] = {"seconds": 20.0, "seed": 20211011, "speaker": "chiara", "emotion": "neutral"}
@@ -33,25 +30,10 @@ DEMO_MINUTES = 20.0
 
 def _cache_compilations() -> None:
     """Keep compiled programs between runs; XLA compiles for seconds what it runs in milliseconds."""
-    if jax.config.values.get("jax_compilation_cache_dir") is None:
-        home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-        jax.config.update("jax_compilation_cache_dir", str(home / "a2g_jax" / "xla"))
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr)
-
-
-def _progress(items: Any, total: int, what: str, unit: str) -> tqdm:
-    return tqdm(
-        items, total=total, desc=what, unit=unit, file=sys.stderr, mininterval=0.5 if sys.stderr.isatty() else 10
-    )
-
-
-def demo_run() -> Run:
-    """The weights that come with the package."""
-    with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
-        return load_run(folder)
+    if os.environ.get("JAX_COMPILATION_CACHE_DIR") is None:
+        cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
+        jax.config.update("jax_compilation_cache_dir", str(Path(cache) / "a2g_jax" / "xla"))
+        jax.config.update("jax_compilation_cache_max_size", 500_000_000)
 
 
 def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
@@ -59,11 +41,15 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
     if options.reader == "talker":
         if options.source is not None:
             raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
-        corpus = prepare_talker(options.out, options.minutes, options.seed, options.fps)
+        if options.joints is not None:
+            raise InputError("--joints is for recordings; a generated corpus has the 22 body joints.")
+        corpus = prepare_talker(options.out, options.minutes or 30.0, options.seed, options.fps)
     else:
         if options.source is None:
             raise InputError("name the folder: a2g prepare folder SOURCE --out CORPUS.")
-        corpus = prepare_folder(options.source, options.out, options.seed, options.fps, options.joints)
+        if options.minutes is not None:
+            raise InputError("--minutes is for 'a2g prepare talker'; a folder is prepared whole.")
+        corpus = prepare_folder(options.source, options.out, options.seed, options.fps, options.joints or "body")
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
     print(
         f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
@@ -71,44 +57,6 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
         + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
         + ")"
     )
-
-
-def prepare_talker(out: str | Path, minutes: float, seed: int, fps: float) -> Corpus:
-    """A generated corpus of so many minutes."""
-    mel = MelConfig()
-    roles = cast(minutes, seed)
-
-    def rows():
-        for role in _progress(roles, len(roles), "generating", "recording"):
-            yield prepare_recording(talk(**role, fps=fps, sample_rate=mel.sample_rate), fps, mel)
-
-    recipe = {"reader": "talker", "minutes": minutes, "seed": seed, "roles": roles}
-    return write_corpus(out, rows(), fps=fps, mel=mel, recipe=recipe, seed=seed, report=_say)
-
-
-def prepare_folder(source: str | Path, out: str | Path, seed: int, fps: float, joints: str) -> Corpus:
-    """A corpus from the user's own WAV and BVH files."""
-    mel = MelConfig()
-    pairs = find_pairs(source)
-
-    def rows():
-        for audio, bvh in _progress(pairs, len(pairs), "preparing", "recording"):
-            prepared = prepare_recording(read_pair(audio, bvh, mel.sample_rate), fps, mel, joints)
-            if audio is pairs[0][0]:
-                _say(_joints_line(prepared, joints))
-            yield prepared
-
-    recipe = {"reader": "folder", "source": str(source), "seed": seed, "joints": joints}
-    return write_corpus(out, rows(), fps=fps, mel=mel, recipe=recipe, seed=seed, report=_say)
-
-
-def _joints_line(prepared: Prepared, joints: str) -> str:
-    count = prepared.skeleton.joints
-    if joints == "all":
-        return f"training on all {count} joints of the rig"
-    if count == 22:
-        return "found the 22 body joints by name; fingers and other joints are left out (--joints all keeps them)"
-    return f"the 22 body joints cannot all be found by name: training on all {count} joints of the rig"
 
 
 def parse_settings(pairs: list[str], model: Any, training: TrainConfig) -> tuple[Any, TrainConfig]:
@@ -172,7 +120,7 @@ def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g generate``."""
     check_formats(options.formats)
     _cache_compilations()
-    run = demo_run() if options.run == "demo" and not Path("demo/run.json").exists() else load_run(options.run)
+    run = demo_run() if options.run == "demo" else load_run(options.run)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
     _generate(run, audio, options, Path(options.audio).name)
 
@@ -201,7 +149,7 @@ def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:
 
 
 def _generate(run: Run, audio: Any, options: argparse.Namespace, title: str, words: Any = ()) -> None:
-    with tqdm(total=options.samples, desc="generating", unit="motion", file=sys.stderr) as bar:
+    with progress_bar(options.samples, "generating", "motion") as bar:
         written = deliver(
             run,
             audio,

@@ -68,12 +68,3 @@ def _checked(value: Any, kind: Any, where: str) -> Any:
     if typing.get_origin(kind) is None and isinstance(value, kind) and (kind is bool or not isinstance(value, bool)):
         return value
     raise InputError(f"{where}: expected {getattr(kind, '__name__', kind)}; got {value!r}.")
-
-
-def differences(first: Any, second: Any, ignore: frozenset[str] = frozenset()) -> list[str]:
-    """'name: a, now b' for every field in which two settings objects of one class differ."""
-    return [
-        f"{field.name}: {getattr(first, field.name)}, now {getattr(second, field.name)}"
-        for field in dataclasses.fields(first)
-        if field.name not in ignore and getattr(first, field.name) != getattr(second, field.name)
-    ]

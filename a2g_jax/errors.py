@@ -5,5 +5,9 @@ class A2GError(Exception):
     """Base of the package's own errors; the command line prints one as a single line and exits with status 2."""
 
 
+class Interrupted(A2GError):
+    """Training was stopped from outside after saving its state."""
+
+
 class InputError(A2GError, ValueError):
     """A file or value that cannot be used: the message names it, the place in it and the mend."""

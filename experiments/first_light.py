@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from a2g_jax.commands import demo_run
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.talker.recordings import resample_motion, talk
 from a2g_jax.generation.generate import Generator
+from a2g_jax.geometry.body import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.metrics.rhythm import (
@@ -30,7 +30,7 @@ from a2g_jax.metrics.rhythm import (
     wrist_speed,
 )
 from a2g_jax.training.evaluation import validate
-from a2g_jax.training.run import Run, load_run
+from a2g_jax.training.run import Run, demo_run, load_run
 
 #: Seconds from a stroke's fastest moment to its syllable's energy peak, as the generated corpus has it.
 LEAD = 0.15
@@ -50,15 +50,18 @@ def multimodality(motions: list[Motion]) -> float:
 
 def jerk(motion: Motion) -> float:
     """90th percentile of the wrists' jerk, m/s^3 (third differences)."""
-    wrists = motion.positions()[:, [20, 21]]
-    third = np.diff(wrists, n=3, axis=0) * motion.fps**3
+    body = find_body(motion.skeleton)
+    joints = motion.positions() if body is None else motion.positions()[:, [body[20], body[21]]]
+    third = np.diff(joints, n=3, axis=0) * motion.fps**3
     return float(np.percentile(np.linalg.norm(third, axis=-1), 90))
 
 
 def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, object]:
-    """Figures on the test split of a generated corpus."""
+    """Figures on the held-out splits of a corpus; on a generated one also beside the truth."""
     generator = Generator(run)
-    losses = validate(run.config.build(), run.params, corpus, run.config, split="test")
+    losses = held_out(run, corpus)
+    if corpus.recipe.get("reader") != "talker":
+        return losses  # of real recordings there is one take, and no truth to draw from
     roles = [corpus.recipe["roles"][segment.recording] for segment in corpus.splits["test"]][:takes]
     recordings = [talk(**role, fps=run.config.fps) for role in roles]
     speech = []
@@ -82,8 +85,7 @@ def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, o
     return {
         "test recordings": len(recordings),
         "samples": samples,
-        "reconstruction_cm": losses["reconstruction_cm"],
-        "mean_pose_cm": losses["mean_pose_cm"],
+        **losses,
         "multimodality_cm": float(np.mean(ours)),
         "true_multimodality_cm": float(np.mean(truth)),
         "agreement": _spread(own),
@@ -95,7 +97,20 @@ def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, o
     }
 
 
+def held_out(run: Run, corpus: Corpus) -> dict[str, object]:
+    """Reconstruction error on everything that was not trained on, beside that of the training data's mean pose."""
+    model = run.config.build()
+    parts = {split: validate(model, run.params, corpus, run.config, split) for split in ("validation", "test")}
+    return {
+        split: {name: terms[name] for name in ("reconstruction_cm", "mean_pose_cm")}
+        for split, terms in parts.items()
+        if terms
+    }
+
+
 def _spread(values: list[float]) -> dict[str, float]:
+    if not values:
+        return {"n": 0}
     return {"mean": float(np.mean(values)), "std": float(np.std(values)), "n": len(values)}
 
 

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Float
@@ -82,12 +83,24 @@ class Corpus:
                 recipe=manifest["recipe"],
                 fingerprint=manifest["fingerprint"],
             )
-        except (KeyError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
         corpus._check()
         return corpus
 
     def _check(self) -> None:
+        """Shapes and bounds, so that nothing fails later, in the middle of a training."""
+        where = self.path / MANIFEST
+        if not 0 < self.fps < 10_000:
+            raise InputError(f"{where}: is damaged (fps is {self.fps}); prepare the corpus anew.")
+        for name, segments in self.splits.items():
+            for index, start, stop in segments:
+                if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
+                    raise InputError(f"{where}: is damaged ({name} holds {[index, start, stop]}); prepare it anew.")
+        shapes = {"audio": (self.mel.bands,), "pose": (self.skeleton.joints, 6), "root": (3,)}
+        for name, statistics in self.statistics.items():
+            if not statistics.mean.shape == statistics.std.shape == shapes[name] or not np.all(statistics.std > 0):
+                raise InputError(f"{self.path / 'statistics.npz'}: is damaged ({name}); prepare the corpus anew.")
         frames, joints = self.frames, self.skeleton.joints
         for name, shape in zip(ARRAYS, ((frames, self.mel.bands), (frames, joints, 6), (frames, 3)), strict=True):
             array = self._array(name)
@@ -132,7 +145,7 @@ class Corpus:
                     name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"])
                     for name in ("audio", "pose", "root")
                 }
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
             raise InputError(f"{path}: cannot be read ({error}); prepare the corpus anew.") from None
 
     def segments(self, split: str) -> list[Segment]:

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from a2g_jax.data.recording import Recording
@@ -17,39 +18,59 @@ def find_pairs(folder: str | os.PathLike[str]) -> list[tuple[Path, Path]]:
     """(audio, BVH) files of equal name anywhere under a folder, in the order of their names.
 
     Raises:
-        InputError: no such folder, a BVH without audio or audio without a BVH, or no pairs.
+        InputError: no such folder, no files, one without its partner, or two of one name.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; name one that holds WAV and BVH files of equal names.")
-    sounds: dict[Path, Path] = {}
-    motions: dict[Path, Path] = {}
-    for path in sorted(folder.rglob("*")):
-        if path.name.startswith("."):
-            continue
-        if path.suffix.lower() in AUDIO_SUFFIXES:
-            sounds.setdefault(path.with_suffix(""), path)
-        elif path.suffix.lower() == ".bvh":
-            motions[path.with_suffix("")] = path
-    # Folders that keep audio and motion apart pair by file name alone.
-    if not set(sounds) & set(motions):
-        sounds = {Path(path.stem): path for path in sounds.values()}
-        motions = {Path(path.stem): path for path in motions.values()}
+    files = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
+    sounds = [path for path in files if path.suffix.lower() in AUDIO_SUFFIXES]
+    motions = [path for path in files if path.suffix.lower() == ".bvh"]
     if not sounds and not motions:
         raise InputError(f"{folder}: holds no WAV and no BVH files; name a folder that does.")
-    for missing, there, kind in ((motions, sounds, "BVH"), (sounds, motions, "audio")):
+    # Side by side; else in parallel trees such as wav/s1/a.wav and bvh/s1/a.bvh; else by file name alone.
+    for key in (_whole_path, _below_first_folder, _name_alone):
+        heard, seen = _by_key(sounds, folder, key), _by_key(motions, folder, key)
+        if set(heard) & set(seen):
+            break
+    for missing, there, kind in ((seen, heard, "BVH"), (heard, seen, "audio")):
         lonely = sorted(set(there) - set(missing))
         if lonely:
-            raise InputError(f"{there[lonely[0]]}: has no {kind} file of the same name beside it; add or remove it.")
-    return [(sounds[key], motions[key]) for key in sorted(motions)]
+            raise InputError(f"{there[lonely[0]][0]}: has no {kind} file of the same name; add or remove it.")
+    for paths in (*heard.values(), *seen.values()):
+        if len(paths) > 1:
+            raise InputError(f"{paths[0]} and {paths[1]}: have the same name; rename or remove one.")
+    return [(heard[name][0], seen[name][0]) for name in sorted(seen)]
 
 
-def read_pair(audio: Path, bvh: Path, sample_rate: int) -> Recording:
-    """One recording; words come from a TextGrid of the same name, where there is one."""
+def _whole_path(path: Path) -> str:
+    return path.with_suffix("").as_posix()
+
+
+def _below_first_folder(path: Path) -> str:
+    return Path(*path.with_suffix("").parts[1:]).as_posix() if len(path.parts) > 1 else path.stem
+
+
+def _name_alone(path: Path) -> str:
+    return path.stem
+
+
+def _by_key(paths: list[Path], folder: Path, key: Callable[[Path], str]) -> dict[str, list[Path]]:
+    groups: dict[str, list[Path]] = {}
+    for path in paths:
+        groups.setdefault(key(path.relative_to(folder)), []).append(path)
+    return groups
+
+
+def read_pair(audio: Path, bvh: Path, sample_rate: int, name: str = "") -> Recording:
+    """One recording, named after the BVH file unless given a name.
+
+    Words come from a TextGrid of the same name beside the audio, where there is one.
+    """
     motion = read_bvh(bvh)
     grid = audio.with_suffix(".TextGrid")
     return Recording(
-        name=bvh.stem,
+        name=name or bvh.stem,
         audio=read_audio(audio, sample_rate),
         sample_rate=sample_rate,
         motion=motion,

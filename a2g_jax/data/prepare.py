@@ -23,7 +23,7 @@ from a2g_jax.geometry.body import find_body
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.select import select_joints
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import sha256_file, write_json
+from a2g_jax.io.files import make_folder, sha256_file, write_json
 
 #: Standard deviations are raised to these before anything is divided by them.
 _FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
@@ -69,6 +69,8 @@ def prepare_recording(recording: Recording, fps: float, mel: MelConfig, joints: 
     if joints == "body" and (body := find_body(motion.skeleton)) is not None:
         motion = select_joints(motion, body)
     frames = min(round(heard * fps), round(seen * fps))
+    if frames < 2:
+        raise InputError(f"{where}: gives {frames} frames at {fps:g} fps; use longer recordings or a higher --fps.")
     motion = resample(motion, fps, frames)
     rotations = np.asarray(motion.rotations, np.float32)
     return Prepared(
@@ -107,10 +109,12 @@ def write_corpus(
         InputError: the folder exists, nothing was prepared, or recordings have different joints.
     """
     path = Path(path)
-    if path.exists():
-        raise InputError(f"{path}: exists already; choose another folder or remove it.")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    refuse_existing(path)
+    make_folder(path.parent)
+    # What a killed run left behind.
+    for stale in path.parent.glob(f".{path.name}.unfinished-*"):
+        shutil.rmtree(stale, ignore_errors=True)
+    work = Path(tempfile.mkdtemp(prefix=f".{path.name}.unfinished-", dir=path.parent))
     try:
         entries, skeleton = _write_rows(work, prepared, report)
         _finish_arrays(work, entries, mel.bands, skeleton.joints)
@@ -138,6 +142,12 @@ def write_corpus(
     finally:
         shutil.rmtree(work, ignore_errors=True)
     return Corpus.open(path)
+
+
+def refuse_existing(path: Path) -> None:
+    """A corpus is never written over: raise ``InputError`` if something has its name."""
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already; choose another folder or remove it.")
 
 
 def _write_rows(

@@ -1,8 +1,8 @@
 """Generated motions as files: BVH, NPZ and a page to look at."""
 
 import os
+import re
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
@@ -11,10 +11,13 @@ from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.generation.generate import Generator
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.io.files import make_folder
 from a2g_jax.io.npz import write_motion_npz
 from a2g_jax.training.run import Run
 
 FORMATS = ("bvh", "npz", "html")
+#: Most joint positions that a page may hold: about 200 MB of HTML.
+_PAGE_LIMIT = 20_000_000
 
 
 def check_formats(text: str) -> tuple[str, ...]:
@@ -54,24 +57,38 @@ def deliver(
 
     Returns:
         How many files of each format were written.
+
+    Raises:
+        InputError: unknown format, a folder that cannot be used, audio shorter than a frame, or too large a page.
     """
     from a2g_jax.viz.player import Figure, write_page
 
     kinds = check_formats(formats)
-    out = Path(out)
-    if out.is_file():
-        raise InputError(f"{out}: is a file; name a folder to write to.")
-    motions = Generator(run).generate(audio, samples, seed, report)
-    out.mkdir(parents=True, exist_ok=True)
-    for number, motion in enumerate(motions):
+    generator = Generator(run)
+    frames, joints = generator.frames(audio), run.config.skeleton.joints
+    if "html" in kinds and samples * frames * joints > _PAGE_LIMIT:
+        raise InputError(
+            f"a page of {samples} motions of {frames} frames would be too large for a browser;"
+            " ask for fewer --samples, or for --formats bvh,npz."
+        )
+    out = make_folder(out)
+    # What an earlier run left here would stand beside motions for another speech.
+    for old in (*out.glob("sample_*.bvh"), *out.glob("sample_*.npz"), *out.glob("index.html")):
+        if re.fullmatch(r"sample_\d+\.(bvh|npz)|index\.html", old.name):
+            old.unlink()
+    figures = []
+    for number, motion in enumerate(generator.stream(audio, samples, seed)):
         if "bvh" in kinds:
             write_bvh(out / f"sample_{number:02d}.bvh", motion)
         if "npz" in kinds:
             write_motion_npz(out / f"sample_{number:02d}.npz", motion)
-    if "html" in kinds:
+        if "html" in kinds:
+            figures.append(Figure(motion=motion, label=f"sample {number}"))
+        report(number + 1)
+    if figures:
         write_page(
             out / "index.html",
-            [Figure(motion=motion, label=f"sample {number}") for number, motion in enumerate(motions)],
+            figures,
             audio,
             run.config.mel.sample_rate,
             title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from a2g_jax.geometry.kinematics import joint_positions
+from a2g_jax.geometry.kinematics import global_rotations, joint_positions
 from a2g_jax.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix, slerp
 from a2g_jax.geometry.skeleton import Skeleton
 
@@ -39,6 +40,10 @@ class Motion:
         local = _in_chunks(lambda r: _positions(r, offsets, self.skeleton.parents), np.asarray(self.rotations))
         return local + np.asarray(self.root)[:, None]
 
+    def world_rotations(self) -> Float[np.ndarray, "T J 3 3"]:
+        """Orientation of every joint in the world."""
+        return _in_chunks(lambda r: _world_rotations(r, self.skeleton.parents), np.asarray(self.rotations))
+
     def clip(self, start: int, stop: int) -> "Motion":
         """Frames ``start`` to ``stop`` (exclusive)."""
         return replace(self, rotations=self.rotations[start:stop], root=self.root[start:stop])
@@ -47,6 +52,12 @@ class Motion:
 jax.tree_util.register_dataclass(Motion, data_fields=["rotations", "root", "skeleton"], meta_fields=["fps"])
 
 _positions = jax.jit(joint_positions, static_argnums=2)
+
+
+@partial(jax.jit, static_argnums=1)
+def _world_rotations(rotations: Array, parents: tuple[int, ...]) -> Array:
+    return jax.vmap(lambda frame: global_rotations(frame, parents))(rotations)
+
 
 #: Frames handled by one call of a compiled kernel, so that no length of motion compiles anew.
 _CHUNK = 512

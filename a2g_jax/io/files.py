@@ -80,6 +80,26 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         ) from error
 
 
+def make_folder(path: str | os.PathLike[str]) -> Path:
+    """Make a folder, and those above it, unless it is there.
+
+    Raises:
+        InputError: a file stands in the way, or the folder cannot be made or written to.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InputError(f"{path}: is a file; name a folder.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: cannot be made ({getattr(error, 'strerror', error)}); name another folder."
+        ) from None
+    if not os.access(path, os.W_OK):
+        raise InputError(f"{path}: may not be written to; name another folder or change its permissions.")
+    return path
+
+
 def sha256_file(path: str | os.PathLike[str]) -> str:
     """SHA-256 of a file's bytes, as 64 hexadecimal digits."""
     try:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from a2g_jax.errors import InputError
+
 
 @dataclass(frozen=True)
 class TrainConfig:
@@ -35,6 +37,20 @@ class TrainConfig:
     """Corpora up to this size are held on the device; larger ones are read from disk batch by batch."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "batch_size", "checkpoint_every", "validate_every", "log_every", "keep_checkpoints"):
+            if getattr(self, name) < 1:
+                raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
+        for name in ("warmup_steps", "clip_norm", "augmentation", "device_megabytes"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
+        if not 0 < self.learning_rate < float("inf"):
+            raise InputError(f"--learning-rate: expected a number above 0; got {self.learning_rate}.")
+        if self.schedule not in ("constant", "cosine"):
+            raise InputError(f"--schedule: expected 'constant' or 'cosine'; got {self.schedule!r}.")
+        if not 0 <= self.seed < 2**31:
+            raise InputError(f"--seed: expected a whole number from 0 to 2147483647; got {self.seed}.")
 
 
 TRAIN_PRESETS: dict[str, TrainConfig] = {

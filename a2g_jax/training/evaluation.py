@@ -1,5 +1,7 @@
 """Figures taken during training: the validation loss, and what a model keeps about its latent space."""
 
+from collections.abc import Iterator
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,18 +18,20 @@ _VALIDATION_CLIPS, _SUMMARY_CLIPS = 64, 4096
 _BATCH = 16
 
 
-def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: int):
-    """Batches of one shape over clips spread evenly through a split, with the number of clips that count in each."""
+def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: int) -> Iterator[Batch]:
+    """Batches over clips spread evenly through a split; the last one may be smaller."""
     frames = model.clip_frames
+    if not corpus.splits.get(split):
+        return
     starts = tiled_starts(corpus, split, frames)
     if len(starts) == 0:
         return
     starts = starts[np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(int)]
     dressing = Dressing(config.statistics["audio"], 0.0)
     for first in range(0, len(starts), _BATCH):
-        rows = starts[np.minimum(np.arange(first, first + _BATCH), len(starts) - 1)]
+        rows = starts[first : first + _BATCH]
         audio, pose = gather_from_disk(corpus.audio, rows, frames), gather_from_disk(corpus.pose, rows, frames)
-        yield dressing(None, jnp.asarray(audio), jnp.asarray(pose)), min(_BATCH, len(starts) - first)
+        yield dressing(None, jnp.asarray(audio), jnp.asarray(pose))
 
 
 def validate(
@@ -40,13 +44,12 @@ def validate(
     totals: dict[str, float] = {}
     count = 0
     loss, rebuild = jax.jit(model.loss), jax.jit(_rebuild, static_argnums=(0, 3))
-    offsets = jnp.asarray(config.skeleton.offsets)
-    for number, (batch, clips) in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
+    offsets, mean_pose = jnp.asarray(config.skeleton.offsets), config.statistics["pose"].mean
+    for number, batch in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
         value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
         figures = {"loss": value, **terms}
-        figures |= rebuild(
-            _Static(model), params, batch, config.skeleton.parents, offsets, config.statistics["pose"].mean
-        )
+        figures |= rebuild(_Static(model), params, batch, config.skeleton.parents, offsets, mean_pose)
+        clips = len(batch.audio)
         for name, figure in figures.items():
             totals[name] = totals.get(name, 0.0) + float(figure) * clips
         count += clips
@@ -79,8 +82,8 @@ def _rebuild(model: _Static, params: Params, batch: Batch, parents, offsets, mea
 def collect_summary(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> Summary:
     """:attr:`Model.summarise` of clips spread evenly through the training split, one row a clip."""
     summarise = jax.jit(model.summarise)
-    parts: list[Summary] = []
-    for number, (batch, clips) in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS)):
-        part = summarise(params, jax.random.fold_in(jax.random.key(1), number), batch)
-        parts.append({name: np.asarray(value)[:clips] for name, value in part.items()})
+    parts = [
+        jax.device_get(summarise(params, jax.random.fold_in(jax.random.key(1), number), batch))
+        for number, batch in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS))
+    ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

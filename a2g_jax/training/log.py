@@ -1,12 +1,13 @@
 """What a training run tells: a progress bar, metrics.jsonl, and TensorBoard if asked for."""
 
 import json
+import math
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.files import atomic_path
 from a2g_jax.training.config import TrainConfig
 
 
@@ -44,7 +45,6 @@ class MetricsLog:
             dynamic_ncols=sys.stderr.isatty(),
             file=sys.stderr,
         )
-        self.started = time.monotonic()
 
     def __enter__(self) -> "MetricsLog":
         self.file = self.path.open("a", encoding="utf-8")
@@ -73,7 +73,9 @@ class MetricsLog:
             self._line(step, "validation", values)
 
     def _line(self, step: int, split: str, values: dict[str, float]) -> None:
-        self.file.write(json.dumps({"step": step, "split": split, **values}) + "\n")
+        # JSON knows no NaN.
+        plain = {name: value if math.isfinite(value) else None for name, value in values.items()}
+        self.file.write(json.dumps({"step": step, "split": split, **plain}) + "\n")
         self.file.flush()
         if self.tensorboard is not None:
             for name, value in values.items():
@@ -90,4 +92,5 @@ class MetricsLog:
                     kept.append(line)
             except (ValueError, KeyError):
                 continue
-        self.path.write_text("".join(line + "\n" for line in kept), encoding="utf-8")
+        with atomic_path(self.path) as temporary:
+            temporary.write_text("".join(line + "\n" for line in kept), encoding="utf-8")

@@ -15,28 +15,22 @@ import numpy as np
 
 from a2g_jax.data.batches import Dressing, draw_starts, find_crops, gather, gather_from_disk
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.errors import A2GError, InputError
-from a2g_jax.io.files import read_json, write_json
+from a2g_jax.errors import A2GError, InputError, Interrupted
+from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.config import TrainConfig
 from a2g_jax.training.evaluation import collect_summary, validate
 from a2g_jax.training.log import MetricsLog
-from a2g_jax.training.run import RUN_FILE, Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.run import FORMAT, RUN_FILE, WEIGHTS_FILE, Run, RunConfig, run_to_json, save_run
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 
 #: Settings that may change between parts of a run, because they do not touch what is computed in a step.
-_FREE = frozenset(
-    {"steps", "checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "device_megabytes", "tensorboard"}
-)
+_FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
 
 
 class TrainingError(A2GError):
     """Training cannot go on: the message says at which step, why, and what to try."""
-
-
-class Interrupted(A2GError):
-    """Training was stopped from outside after saving its state."""
 
 
 def train(
@@ -58,21 +52,22 @@ def train(
     """
     out = Path(out)
     settings = config.train_config
+    # Whatever can be wrong is found before anything is written.
     crops = find_crops(corpus, "train", config.model_config.clip_frames)
-    _check_folder(out, config, resume)
     model = config.build()
-    out.mkdir(parents=True, exist_ok=True)
-    checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
-    sweep_unfinished(checkpoints.folder)
-    write_json(out / RUN_FILE, run_to_json(config, max(checkpoints.steps(), default=0)))
-
     state = init_state(model, settings)
+    checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
+    _check_folder(out, config, checkpoints, resume)
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
-    step_function = _step_function(model, settings, corpus, crops, config)
     done = int(state.step)
+    step_function = _step_function(model, settings, corpus, crops, config)
     export = partial(_export, config, model, corpus, out)
+    make_folder(out)
+    sweep_unfinished(checkpoints.folder)
     with MetricsLog(out, done, settings, progress) as log, _stop_requested() as stop:
+        write_json(out / RUN_FILE, run_to_json(config, done))
+        run = None
         while done < settings.steps:
             state, metrics = step_function(state)
             done += 1
@@ -87,32 +82,37 @@ def train(
             if done % settings.checkpoint_every == 0 or done == settings.steps or stop.is_set():
                 _check_finite(state, done, {}, checkpoints)
                 checkpoints.save(state)
-                export(state)
+                run = export(state)
             if stop.is_set():
                 raise Interrupted(f"{out}: stopped after step {done} of {settings.steps}; go on with --resume.")
-    return export(state)
+    # A run that was finished before has nothing to do but may lack its weights, if it was killed while writing them.
+    return run if run is not None else export(state)
 
 
-def _check_folder(out: Path, config: RunConfig, resume: bool) -> None:
+def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool) -> None:
     if out.is_file():
         raise InputError(f"{out}: is a file; name a folder for the run.")
     if not (out / RUN_FILE).exists():
         if out.is_dir() and any(out.iterdir()):
             raise InputError(f"{out}: is not empty and holds no run; choose another folder.")
         return
+    if not checkpoints.steps() and not (out / WEIGHTS_FILE).exists():
+        return  # stopped before its first checkpoint: nothing is lost by starting anew
     if not resume:
         raise InputError(f"{out}: holds a run already; go on with it by --resume, or choose another folder.")
     values = read_json(out / RUN_FILE)
+    if not isinstance(values, dict) or values.get("format") != FORMAT or not isinstance(values.get("corpus"), dict):
+        raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
     now = json.loads(json.dumps(run_to_json(config, 0)))
     changed = [f"{key}: {values.get(key)}, now {now[key]}" for key in ("model", "fps") if values.get(key) != now[key]]
     for part, free in (("model_config", frozenset()), ("train_config", _FREE), ("mel", frozenset())):
-        before = values.get(part) if isinstance(values.get(part), dict) else {}
+        before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
         changed += [
             f"{name}: {before.get(name)}, now {value}"
             for name, value in now[part].items()
             if name not in free and before.get(name) != value
         ]
-    if values.get("corpus", {}).get("fingerprint") != config.corpus["fingerprint"]:
+    if values["corpus"].get("fingerprint") != config.corpus["fingerprint"]:
         changed.append("the corpus")
     if changed:
         raise InputError(f"{out}: was trained with other settings ({'; '.join(changed)}); resume with the same ones.")
@@ -121,7 +121,7 @@ def _check_folder(out: Path, config: RunConfig, resume: bool) -> None:
 def _step_function(
     model: Model, settings: TrainConfig, corpus: Corpus, crops: Any, config: RunConfig
 ) -> Callable[[TrainState], tuple[TrainState, Metrics]]:
-    """One whole step: choose clips, augment, compute, update. The same numbers wherever the data lies."""
+    """One whole step: choose clips, augment, compute, update. The same clips wherever the data lies."""
     frames = model.clip_frames
     dressing = Dressing(config.statistics["audio"], settings.augmentation)
 

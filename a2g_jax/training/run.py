@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import asdict, dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -147,9 +148,9 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             corpus=values["corpus"],
         )
         steps = int(values["steps"])
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"{folder}: is damaged ({error!r}); restore it or train again.") from None
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
@@ -157,6 +158,12 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     _check_params(weights, config.build(), params)
     summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
     return Run(config, params, summary, steps)
+
+
+def demo_run() -> Run:
+    """The trained run that comes with the package."""
+    with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
+        return load_run(folder)
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:

@@ -1,6 +1,6 @@
 """Whole recordings of the generated corpus: a plan, its voice, and one of its many right motions."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import jax
@@ -89,11 +89,6 @@ def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTrut
         [int(key)] if isinstance(key, int | np.integer) else [int(word) for word in jax.random.key_data(key).ravel()]
     )
     return gesticulate(plan, np.random.default_rng([_MOTION, 1, *words]), recording.motion.fps)
-
-
-def with_motion(recording: Recording, motion: Motion, truth: GestureTruth) -> Recording:
-    """The recording with another motion, as :func:`resample_motion` draws them."""
-    return replace(recording, motion=motion, annotations={**recording.annotations, "gestures": asdict(truth)})
 
 
 def plan_from_json(value: dict[str, Any]) -> SpeechPlan:

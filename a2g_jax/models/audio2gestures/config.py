@@ -1,6 +1,8 @@
 """Settings of Audio2Gestures and its presets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+
+from a2g_jax.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,31 @@ class Audio2GesturesConfig:
     0 keeps one draw for the whole audio, as the authors do; then a hidden choice such as the hand tends to stay the
     same throughout a long speech.
     """
+    noise_scale: float = 1.0
+    """In generation, scale of the noise that becomes the specific code; lower is calmer, 1 is what training saw."""
     sample_codes: bool = True
     """In generation, draw codes from their posteriors, as the authors do; otherwise take their means (smoother)."""
+
+    def __post_init__(self) -> None:
+        for name in ("audio_channels", "motion_channels", "decoder_channels"):
+            channels = getattr(self, name)
+            if not channels or min(channels) < 1:
+                raise InputError(f"--{name.replace('_', '-')}: expected numbers above 0 such as 64,64; got {channels}.")
+        if self.kernel_size < 1 or self.kernel_size % 2 == 0:
+            raise InputError(f"--kernel-size: expected an odd number; got {self.kernel_size}.")
+        for name in ("head_channels", "code_channels"):
+            if getattr(self, name) < 1:
+                raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
+        if self.clip_frames < 2:
+            raise InputError(f"--clip-frames: expected 2 or more, for speeds; got {self.clip_frames}.")
+        if not 0 <= self.dropout < 1:
+            raise InputError(f"--dropout: expected 0 or more and below 1; got {self.dropout}.")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name.endswith(("_weight", "_steps", "_threshold", "_scale", "_frames")) and not (
+                0 <= value < float("inf")
+            ):
+                raise InputError(f"--{field.name.replace('_', '-')}: expected 0 or more; got {value}.")
 
 
 PRESETS: dict[str, Audio2GesturesConfig] = {
@@ -73,13 +98,14 @@ PRESETS: dict[str, Audio2GesturesConfig] = {
         # shared code within the first hundreds of steps; a narrow specific code and the losses that the authors' code
         # puts on sampled motions make the decoder need it.
         kl_shared_weight=1e-6,
-        kl_specific_weight=1e-4,
+        kl_specific_weight=2e-4,
         kl_ramp_steps=1_000,
-        alignment_weight=0.02,
-        alignment_ramp_steps=2_000,
-        sampled_rotation_weight=0.3,
-        sampled_speed_weight=2.5,
-        diversity_weight=0.05,
+        alignment_weight=0.01,
+        alignment_ramp_steps=1_000,
+        sampled_rotation_weight=1.0,
+        sampled_speed_weight=10.0,
+        bicycle_weight=0.02,
+        diversity_weight=0.02,
         diversity_decay_steps=0,
         redraw_frames=128,
         sample_codes=False,

@@ -128,7 +128,8 @@ def build(config: Audio2GesturesConfig, data: Data) -> Model:
         mean, std = blended_draws(
             which, (summary["specific_mean"], summary["specific_std"]), start, frames, config.redraw_frames
         )
-        code = networks.map_noise(params, (mean + std * frame_normal(noise_key, start, frames, channels))[None])
+        noise = config.noise_scale * frame_normal(noise_key, start, frames, channels)
+        code = networks.map_noise(params, (mean + std * noise)[None])
         if config.sample_codes:
             audio_code = shared.shift(frame_normal(shared_key, start, frames, channels)[None])
             specific = code.shift(frame_normal(code_key, start, frames, channels)[None])

@@ -1,10 +1,8 @@
 """Where a figure stands on the page's stage: the place under it, the floor, which way is its front, how large it is."""
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.geometry.kinematics import global_rotations
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.viz.player.body import Body
 from a2g_jax.viz.player.roles import find_roles
@@ -23,10 +21,8 @@ def body_points(motion: Motion, body: Body) -> Float[np.ndarray, "T P 3"]:
         return joints
     owners = np.array([joint for joint, _ in extra])
     offsets = np.array([offset for _, offset in extra])
-    rotations = jax.jit(jax.vmap(lambda frame: global_rotations(frame, motion.skeleton.parents)))(
-        np.asarray(motion.rotations, np.float32)
-    )
-    moved = np.einsum("tpij,pj->tpi", np.asarray(rotations, np.float64)[:, owners], offsets)
+    rotations = motion.world_rotations().astype(np.float64)
+    moved = np.einsum("tpij,pj->tpi", rotations[:, owners], offsets)
     return np.concatenate([joints, joints[:, owners] + moved], axis=1)
 
 
