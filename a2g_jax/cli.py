@@ -22,7 +22,7 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"a2g: {message} (see '{self.prog} --help')\n")
 
 
-def _number(kind: Callable[[str], Any], low: float, high: float, meaning: str) -> Callable[[str], Any]:
+def _number(kind: Callable[[str], Any], low: float | int, high: float | int, meaning: str) -> Callable[[str], Any]:
     """A converter that refuses, in words, what is not a number between ``low`` and ``high``."""
 
     def convert(text: str) -> Any:

@@ -7,9 +7,12 @@ import wave
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from a2g_jax.cli import main
 from a2g_jax.data.talker.recordings import talk
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.io.npz import read_motion_npz
@@ -48,7 +51,8 @@ def test_help_is_quick_and_complete():
         ([], "required"),
         (["dance"], "invalid choice"),
         (["generate", "demo"], "--audio"),
-        (["generate", "demo", "--audio", "x.wav", "--out", "o", "--samples", "0"], "1 or more"),
+        (["generate", "demo", "--audio", "x.wav", "--out", "o", "--samples", "0"], "from 1 to 1000; got '0'"),
+        (["demo", "--seed", "five"], "expected a whole number from 0 to 2147483647; got 'five'"),
         (["demo", "--nonsense"], "unknown argument --nonsense"),
         (["prepare", "talker", "--out", "c", "--minutes", "-3"], "above 0"),
         (["prepare", "folder", "--out", "c"], "name the folder"),
@@ -58,6 +62,13 @@ def test_help_is_quick_and_complete():
         (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--preset", "huge"], "no preset 'huge'"),
         (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--colour", "red"], "no setting --colour"),
         (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--steps", "many"], "--steps: expected a whole"),
+        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--kernel-size", "2"], "an odd number; got 2"),
+        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--log-every", "0"], "expected 1 or more; got 0"),
+        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--schedule", "wild"], "expected 'constant' or"),
+        (["train", "audio2gestures", "--settings", "--audio-channels", ""], "expected numbers above 0"),
+        (["train", "audio2gestures", "--settings", "--learning-rate", "nan"], "expected a number above 0"),
+        (["prepare", "folder", ".", "--minutes", "3", "--out", "c"], "--minutes is for"),
+        (["prepare", "talker", "--out", "/proc/nothing/c", "--minutes", "1"], "cannot be made"),
         (["generate", "nowhere", "--audio", "x.wav", "--out", "o"], "is not a run"),
         (["demo", "--formats", "gif"], "no format 'gif'"),
     ],
@@ -101,9 +112,33 @@ def test_bad_audio_is_refused_in_one_line(capsys, tmp_path, kind):
     assert not (tmp_path / "out").exists()
 
 
+def test_folders_that_cannot_be_written(capsys, tmp_path):
+    write_audio(tmp_path / "speech.wav", talk(2.0, 5).audio, 16000)
+    (tmp_path / "taken").write_text("a file")
+    demo = ["demo", "--audio", str(tmp_path / "speech.wav"), "--out"]
+    assert "is a file; name a folder" in fails(capsys, *demo, str(tmp_path / "taken"))
+    assert "taken" in fails(capsys, *demo, str(tmp_path / "taken" / "below"))
+    assert (tmp_path / "taken").read_text() == "a file"
+
+
+def test_an_error_starts_its_own_line(tmp_path):
+    """Also below a progress bar, where scripts look for it."""
+    write_audio(tmp_path / "mine" / "a.wav", talk(2.0, 5).audio, 16000)
+    (tmp_path / "mine" / "a.bvh").write_text("HIERARCHY\n")
+    command = ["prepare", "folder", str(tmp_path / "mine"), "--out", str(tmp_path / "corpus")]
+    shown = subprocess.run([sys.executable, "-m", "a2g_jax.cli", *command], capture_output=True, text=True)
+    assert shown.returncode == 2
+    last = shown.stderr.splitlines()[-1]
+    assert last.startswith("a2g: ")
+    assert "a.bvh" in last
+    assert "Traceback" not in shown.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+
+
 def test_debug_shows_the_traceback(tmp_path):
-    with pytest.raises(Exception, match="no such file"):
-        main(["demo", "--debug", "--audio", str(tmp_path / "speech.wav")])
+    for arguments in (["--debug", "demo"], ["demo", "--debug"]):
+        with pytest.raises(Exception, match="no such file"):
+            main([*arguments, "--audio", str(tmp_path / "speech.wav")])
 
 
 def test_settings_are_listed(capsys):
@@ -125,6 +160,7 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     train = ["train", "audio2gestures", "--corpus", corpus, "--out", run, "--steps", "8", "--batch-size=2", *SMALL]
     assert main(train) == 0
     assert "holds a run already" in fails(capsys, *train)
+    assert "other settings (batch_size: 2, now 3" in fails(capsys, *train, "--batch-size", "3", "--resume")
     write_audio(tmp_path / "speech.wav", talk(3.7, 5).audio, 16000)
     generate = ["generate", run, "--audio", str(tmp_path / "speech.wav"), "--samples", "2"]
     assert main([*generate, "--out", out]) == 0
@@ -145,3 +181,23 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     other = read_motion_npz(tmp_path / "other" / "sample_00.npz")
     assert np.abs(other.rotations - motion.rotations).max() > 1e-3
     assert json.loads((tmp_path / "run" / "run.json").read_text())["steps"] == 8
+
+
+def test_any_rig_trains_as_it_is(capsys, tmp_path):
+    """All joints of a rig that is no body, at a rate that is no whole number."""
+    names = ("tail", "fin", "eye")
+    skeleton = Skeleton(np.array([[0, 0, 0], [0, 0.2, 0], [0.1, 0, 0]], np.float32), names, (-1, 0, 1))
+    angles = 0.3 * np.sin(np.arange(240)[:, None, None] / 7 + np.arange(9).reshape(1, 3, 3))
+    rotations = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(240, 3, 3, 3).astype(np.float32)
+    motion = Motion(rotations, np.zeros((240, 3), np.float32), skeleton, 30.0)
+    write_audio(tmp_path / "mine" / "fish.wav", talk(8.0, 2).audio, 16000)
+    write_bvh(tmp_path / "mine" / "fish.bvh", motion)
+    corpus, run, out = (str(tmp_path / name) for name in ("corpus", "run", "out"))
+    assert main(["prepare", "folder", str(tmp_path / "mine"), "--out", corpus, "--fps", "23.976"]) == 0
+    shown = capsys.readouterr()
+    assert "training on all 3 joints of the rig" in shown.err
+    assert "3 joints at 23.976 fps" in shown.out
+    train = ["train", "audio2gestures", "--corpus", corpus, "--out", run, "--steps", "4", "--batch-size", "2", *SMALL]
+    assert main(train) == 0
+    assert main(["generate", run, "--audio", str(tmp_path / "mine" / "fish.wav"), "--samples", "1", "--out", out]) == 0
+    assert read_motion_npz(tmp_path / "out" / "sample_00.npz").frames == round(8.0 * 23.976)

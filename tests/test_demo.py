@@ -26,7 +26,7 @@ def test_no_recording_went_into_the_weights():
 
 
 def test_the_shipped_model_listens():
-    """Strokes follow the speech, against the same motion shifted; not the speed of the figures, which are in the README."""
+    """Strokes follow the speech, against the same motion shifted; the README has the figures."""
     generator = Generator(demo_run())
     take = talk(30.0, 987654, speaker="felix")
     motions = generator.generate(take.audio, 3, seed=1)

@@ -14,7 +14,7 @@ _WRISTS = tuple(BODY_JOINTS.index(name) for name in ("L_Wrist", "R_Wrist"))
 
 
 def speech_envelope(
-    audio: Float[np.ndarray, " N"], sample_rate: int, fps: float, frames: int, smoothing: float = 0.08
+    audio: Float[np.ndarray, " N"], sample_rate: int, fps: float, frames: int, smoothing: float = 0.05
 ) -> Float[np.ndarray, " T"]:
     """Speech energy in dB at the motion's frame times, smoothed over about a syllable.
 
@@ -27,7 +27,7 @@ def speech_envelope(
     return np.maximum(decibels, decibels.max() - 50)
 
 
-def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: float = 6.0) -> Float[np.ndarray, " P"]:
+def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: float = 3.0) -> Float[np.ndarray, " P"]:
     """Times (s) of the loud syllables: peaks that stand out by ``prominence`` dB and by the louder half of all."""
     peaks, _ = signal.find_peaks(envelope, prominence=prominence)
     if len(peaks) == 0:

@@ -74,7 +74,7 @@ class Run:
 
 def save_run(folder: str | os.PathLike[str], run: Run) -> None:
     """Write ``run.json`` and ``weights.safetensors``, each whole or not at all."""
-    from safetensors.numpy import save_file
+    from safetensors.numpy import save
 
     folder = Path(folder)
     config = run.config
@@ -84,7 +84,7 @@ def save_run(folder: str | os.PathLike[str], run: Run) -> None:
         arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
     arrays = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
     with atomic_path(folder / WEIGHTS_FILE) as temporary:
-        save_file(arrays, temporary)
+        temporary.write_bytes(save(arrays))
     write_json(folder / RUN_FILE, run_to_json(config, run.steps))
 
 

@@ -116,10 +116,19 @@ def test_damaged_corpora(copy, tmp_path):
         (copy / "manifest.json").write_text(json.dumps({**manifest, **change}))
         with pytest.raises(InputError, match=message):
             Corpus.open(copy)
+    for change in ({"splits": [1]}, {"splits": {"train": [[9, 0, 5]]}}, {"fps": 0}):
+        (copy / "manifest.json").write_text(json.dumps({**manifest, **change}))
+        with pytest.raises(InputError, match="is damaged"):
+            Corpus.open(copy)
     (copy / "manifest.json").write_text("{")
     with pytest.raises(InputError, match="is not JSON"):
         Corpus.open(copy)
     (copy / "manifest.json").write_text(json.dumps(manifest))
+    statistics = (copy / "statistics.npz").read_bytes()
+    (copy / "statistics.npz").write_bytes(statistics[: len(statistics) // 2])
+    with pytest.raises(InputError, match=r"statistics\.npz: cannot be read"):
+        Corpus.open(copy)
+    (copy / "statistics.npz").write_bytes(statistics)
     pose = (copy / "pose.npy").read_bytes()
     (copy / "pose.npy").write_bytes(pose[: len(pose) // 2])
     with pytest.raises(InputError, match=r"pose\.npy: cannot be read"):
@@ -158,6 +167,17 @@ def test_audio_and_motion_in_separate_folders(tmp_path, take):
     write_audio(tmp_path / "wav" / "a.wav", take.audio, 16000)
     write_bvh(tmp_path / "bvh" / "a.bvh", take.motion)
     assert len(find_pairs(tmp_path)) == 1
+
+
+def test_parallel_trees_pair_by_path(tmp_path, take):
+    for speaker in ("s1", "s2"):
+        write_audio(tmp_path / "wav" / speaker / "001.wav", take.audio, 16000)
+        write_bvh(tmp_path / "bvh" / speaker / "001.bvh", take.motion)
+    pairs = find_pairs(tmp_path)
+    assert [(audio.parent.name, bvh.parent.name) for audio, bvh in pairs] == [("s1", "s1"), ("s2", "s2")]
+    write_audio(tmp_path / "wav" / "s1" / "001.flac", take.audio, 16000)
+    with pytest.raises(InputError, match="have the same name"):
+        find_pairs(tmp_path)
 
 
 @pytest.mark.parametrize(("name", "frames"), [("zeggs", 2065), ("beat", 1912)])

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
-from a2g_jax.training import loop
+from a2g_jax.geometry.kinematics import joint_positions
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.training import evaluation, loop
 from a2g_jax.training.loop import Interrupted, TrainingError, train
 from a2g_jax.training.run import load_run, save_run
 
@@ -87,6 +89,39 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(tmp_path, toy_corpus, toy_
         train(config, toy_corpus, tmp_path / "run", resume=False, progress=False)
     for leaf in jax.tree.leaves(load_run(tmp_path / "run").params):
         assert np.all(np.isfinite(leaf))
+
+
+def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config):
+    """18 clips make a full batch and a small one; their mean is that of single clips."""
+    config = toy_run_config()
+    model = config.build()
+    params = jax.jit(model.init)(jax.random.key(0))
+    figures = evaluation.validate(model, params, toy_corpus, config)
+    starts = evaluation.tiled_starts(toy_corpus, "validation", 16)
+    assert len(starts) == 18
+    single = []
+    for start in starts:
+        pose = np.asarray(toy_corpus.pose[start : start + 16])
+        places = joint_positions(matrix_from_6d(pose), toy_corpus.skeleton.offsets, toy_corpus.skeleton.parents)
+        mean = joint_positions(
+            matrix_from_6d(toy_corpus.statistics["pose"].mean), toy_corpus.skeleton.offsets, toy_corpus.skeleton.parents
+        )
+        single.append(100 * np.linalg.norm(places - mean[None], axis=-1).mean())
+    assert figures["mean_pose_cm"] == pytest.approx(np.mean(single), rel=1e-4)
+
+
+def test_a_run_that_never_got_to_a_checkpoint_can_be_started_again(tmp_path, toy_corpus, toy_run_config):
+    out = tmp_path / "run"
+    with pytest.raises(TrainingError):
+        train(
+            toy_run_config(steps=40, learning_rate=1e30, clip_norm=0.0, warmup_steps=0, log_every=1),
+            toy_corpus,
+            out,
+            resume=False,
+            progress=False,
+        )
+    train(toy_run_config(steps=5), toy_corpus, out, resume=False, progress=False)
+    assert load_run(out).steps == 5
 
 
 def test_folders_that_cannot_be_used(tmp_path, toy_corpus, toy_run_config):
