@@ -340,7 +340,7 @@ def test_log_mel_statistics_are_near_real_speech(shared):
 
     real = []
     for name in ("speech/jfk.wav", "beat/2_scott_0_1_1.wav", "zeggs/067_Speech_2_x_1_0.wav"):
-        audio, rate = soundfile.read(shared / "data" / name, dtype="float32")
+        audio, rate = soundfile.read(shared / name, dtype="float32")
         assert rate == RATE
         real.append(log_mel(audio[: 40 * RATE]))
     ours = [log_mel(render(speaker, seconds=20.0, seed=1)[1]) for speaker in SPEAKERS]

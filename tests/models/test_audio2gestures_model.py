@@ -26,6 +26,7 @@ CONFIG = replace(
     code_channels=4,
     clip_frames=6,
     kl_ramp_steps=10,
+    alignment_ramp_steps=10,
     diversity_decay_steps=20,
     kl_shared_weight=0.01,
     kl_specific_weight=0.02,
@@ -96,7 +97,7 @@ class TestLoss:
     @pytest.mark.parametrize(("step", "ramp", "decay"), [(0, 0, 1), (5, 0.5, 0.75), (10, 1, 0.5), (500, 1, 0)])
     def test_total_is_the_weighted_sum(self, loss, params, batch, step, ramp, decay):
         total, terms = loss(params, jax.random.key(0), batch, jnp.int32(step))
-        schedule = {"kl_shared": ramp, "kl_specific": ramp, "diversity": decay}
+        schedule = {"alignment": ramp, "kl_shared": ramp, "kl_specific": ramp, "diversity": decay}
         expected = sum(getattr(CONFIG, f"{name}_weight") * schedule.get(name, 1) * terms[name] for name in TERMS)
         np.testing.assert_allclose(total, expected, rtol=1e-5)
 
