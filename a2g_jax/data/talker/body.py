@@ -72,3 +72,37 @@ TALKER_SKELETON = Skeleton(
 Wrist to wrist 1.2064 m, the reference length by which the Audio2Gestures papers scale position errors.
 The head's end is the crown (1.70 m), the wrists' ends are finger tips, the feet's ends are toes.
 """
+
+FINGERS = ("Index", "Middle", "Pinky", "Ring", "Thumb")
+"""SMPL-X order of the fingers of a hand."""
+
+_FINGER_CHAINS: dict[str, tuple[tuple[float, float, float], ...]] = {
+    "Index": ((0.090, -0.002, 0.024), (0.042, -0.001, 0.002), (0.025, 0.0, 0.0), (0.021, 0.0, 0.0)),
+    "Middle": ((0.089, 0.002, 0.002), (0.046, -0.001, 0.0), (0.029, 0.0, 0.0), (0.022, 0.0, 0.0)),
+    "Pinky": ((0.076, -0.005, -0.037), (0.034, -0.001, -0.003), (0.019, 0.0, -0.001), (0.019, 0.0, 0.0)),
+    "Ring": ((0.084, 0.0, -0.018), (0.043, -0.001, -0.001), (0.027, 0.0, 0.0), (0.022, 0.0, 0.0)),
+    "Thumb": ((0.024, -0.012, 0.020), (0.030, -0.011, 0.028), (0.024, -0.007, 0.021), (0.020, -0.004, 0.016)),
+}
+"""Left hand at rest, palm down, thumb forward: knuckle from wrist, then the three bones; metres."""
+
+
+def _hands_skeleton() -> Skeleton:
+    names, parents = list(BODY_JOINTS), list(BODY_PARENTS)
+    offsets = [np.asarray(offset) for offset in TALKER_SKELETON.offsets]
+    ends = [end for end in TALKER_SKELETON.ends if "Wrist" not in BODY_JOINTS[end[0]]]
+    for letter, side in (("L", 1.0), ("R", -1.0)):
+        for finger in FINGERS:
+            chain = [(side * x, y, z) for x, y, z in _FINGER_CHAINS[finger]]
+            for number in (1, 2, 3):
+                parents.append(BODY_JOINTS.index(f"{letter}_Wrist") if number == 1 else len(names) - 1)
+                names.append(f"{letter}_{finger}{number}")
+                offsets.append(np.array(chain[number - 1]))
+            ends.append((len(names) - 1, chain[3]))
+    return Skeleton(np.array(offsets, dtype=np.float32), tuple(names), tuple(parents), tuple(ends))
+
+
+TALKER_HANDS_SKELETON = _hands_skeleton()
+"""The same body with 15 finger joints a hand, in SMPL-X order: 52 joints, T-pose, palms down, finger tips as ends.
+
+A stretched hand is 0.185 m long, 10.9 % of the body's height (Winter 2009: 10.8 %).
+"""

@@ -5,7 +5,8 @@ from jaxtyping import Float
 
 from a2g_jax.data.talker import body
 from a2g_jax.data.talker.arms import plan_arms
-from a2g_jax.data.talker.body import TALKER_SKELETON
+from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON, TALKER_SKELETON
+from a2g_jax.data.talker.fingers import finger_rotations, plan_fingers
 from a2g_jax.data.talker.gesture_plan import draw_gestures
 from a2g_jax.data.talker.ik import Rotations, Vectors, arm_rotations, leg_rotations, rotate, turn, yaw_roll_pitch
 from a2g_jax.data.talker.paths import draw_waves, softplus
@@ -27,7 +28,9 @@ _HAND_LAG = 0.035
 """Relaxed hands follow their wrists by this much, seconds."""
 
 
-def gesticulate(plan: SpeechPlan, rng: np.random.Generator, fps: float = 30.0) -> tuple[Motion, GestureTruth]:
+def gesticulate(
+    plan: SpeechPlan, rng: np.random.Generator, fps: float = 30.0, fingers: bool = False
+) -> tuple[Motion, GestureTruth]:
     """Draw a motion for a speech plan.
 
     When strokes and nods happen and how large they are follows from the plan; hands, families, places, holds, rest
@@ -38,9 +41,11 @@ def gesticulate(plan: SpeechPlan, rng: np.random.Generator, fps: float = 30.0) -
         plan: what is said.
         rng: source of every hidden choice; advanced.
         fps: frames per second.
+        fingers: with finger joints; the body's joints and what was drawn are the same with and without.
 
     Returns:
-        Motion of ``round(plan.seconds * fps)`` frames on :data:`TALKER_SKELETON` (float32), and what was drawn.
+        Motion of ``round(plan.seconds * fps)`` frames (float32) on :data:`TALKER_SKELETON`, or
+        :data:`TALKER_HANDS_SKELETON` with ``fingers``, and what was drawn.
 
     Raises:
         InputError: for a speaker or emotion without a gesture style.
@@ -50,6 +55,8 @@ def gesticulate(plan: SpeechPlan, rng: np.random.Generator, fps: float = 30.0) -
     tracks, phases = plan_arms(plan, draws, style, rng)
     posture = plan_posture(plan, draws, style, rng)
     idle = {hand: draw_waves(rng, _IDLE, 0.18, 1.3) for hand in ("left", "right")}
+    # A stream of their own, seeded whether they are wanted or not: the body is the same with and without them.
+    finger_rng = np.random.default_rng(rng.integers(2**63))
 
     times = np.arange(round(plan.seconds * fps)) / fps
     lag = _HAND_LAG * (1.0 - 0.8 * min(style.tension, 1.0))
@@ -69,7 +76,15 @@ def gesticulate(plan: SpeechPlan, rng: np.random.Generator, fps: float = 30.0) -
         posture=draws.posture,
         units=draws.units,
     )
-    motion = Motion(rotations.astype(np.float32), root.astype(np.float32), TALKER_SKELETON, float(fps))
+    skeleton = TALKER_SKELETON
+    if fingers:
+        skeleton = TALKER_HANDS_SKELETON
+        hands = []
+        for hand, side in (("left", 1.0), ("right", -1.0)):
+            shapes = plan_fingers(hand, draws, phases, style, finger_rng)
+            hands.append(finger_rotations(shapes, times, side, style, finger_rng))
+        rotations = np.concatenate([rotations, *hands], axis=1)
+    motion = Motion(rotations.astype(np.float32), root.astype(np.float32), skeleton, float(fps))
     return motion, truth
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from a2g_jax.data.recording import Recording, Word
 from a2g_jax.data.talker.augment import augment
+from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON
 from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.data.talker.gestures import gesticulate
 from a2g_jax.data.talker.plan import plan_speech
@@ -34,6 +35,7 @@ def talk(
     sample_rate: int = 16000,
     name: str = "",
     room: bool = False,
+    fingers: bool = False,
 ) -> Recording:
     """Generate one recording: someone says something in an invented language, and gestures.
 
@@ -46,6 +48,7 @@ def talk(
         speaker: one of :data:`~a2g_jax.data.talker.speakers.SPEAKERS`.
         emotion: one of :data:`~a2g_jax.data.talker.emotions.VOICE_EMOTIONS`.
         room: as heard by some microphone in some room, with noise, instead of clean.
+        fingers: move on the skeleton with finger joints; the body moves the same without.
 
     Raises:
         InputError: unknown speaker or emotion, or too short.
@@ -54,7 +57,7 @@ def talk(
         if value not in known:
             raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
     plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH]))
-    motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps)
+    motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps, fingers)
     audio = synthesise(plan, np.random.default_rng([seed, _VOICE]), sample_rate)
     if room:
         audio = augment(audio, sample_rate, np.random.default_rng([seed, _ROOM]))
@@ -73,7 +76,8 @@ def talk(
 def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTruth]:
     """Another right motion for the same audio: everything that the audio leaves open is drawn anew.
 
-    This is a draw from the true conditional distribution that a model of the corpus should learn.
+    This is a draw from the true conditional distribution that a model of the corpus should learn. It has fingers if the
+    recording's motion has them.
 
     Args:
         recording: made by :func:`talk`, or read back with its annotations.
@@ -88,7 +92,8 @@ def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTrut
     words = (
         [int(key)] if isinstance(key, int | np.integer) else [int(word) for word in jax.random.key_data(key).ravel()]
     )
-    return gesticulate(plan, np.random.default_rng([_MOTION, 1, *words]), recording.motion.fps)
+    fingers = recording.motion.skeleton.same_tree(TALKER_HANDS_SKELETON)
+    return gesticulate(plan, np.random.default_rng([_MOTION, 1, *words]), recording.motion.fps, fingers)
 
 
 def plan_from_json(value: dict[str, Any]) -> SpeechPlan:
