@@ -211,7 +211,7 @@ def test_detector_is_worse_on_fast_points():
     seen = confidence > 0
     fast, slow = (np.std((noisy - moving)[:, joint][seen[:, joint]]) for joint in (10, 11))
     assert fast > 2 * slow
-    assert (~seen[:, 10]).mean() > 2 * (~seen[:, 11]).mean()
+    assert (~seen[:, 10]).mean() > 1.5 * (~seen[:, 11]).mean()
     again, _ = Detector(loss=0.01).detect(moving, np.random.default_rng(1))
     np.testing.assert_array_equal(noisy, again)
 
@@ -269,6 +269,10 @@ def test_directions_are_the_bones_of_the_talker(take):
     bone /= np.linalg.norm(bone, axis=1, keepdims=True)
     full = ted.directions(take.motion, ted.TED_EXPRESSIVE).reshape(120, 42, 3)
     np.testing.assert_allclose(full[:, 4], bone * [1, -1, -1], atol=1e-5)
+    for number, above, joint in ((5, "L_Wrist", "L_Index1"), (15, "L_Ring1", "L_Ring2"), (36, "R_Thumb2", "R_Thumb3")):
+        bones = places[:, names.index(joint)] - places[:, names.index(above)]
+        bones /= np.linalg.norm(bones, axis=1, keepdims=True)
+        np.testing.assert_allclose(full[:, number], bones * [1, -1, -1], atol=1e-4)
     small = ted.directions(take.motion, ted.TED).reshape(120, 9, 3)
     np.testing.assert_allclose(small[:, 5], bone * [-1, -1, 1], atol=1e-5)
 

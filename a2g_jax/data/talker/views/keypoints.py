@@ -87,7 +87,7 @@ class Detector:
     A keypoint's error is the sum of jitter that is new in every frame and of a wobble smoothed over three frames, each
     of half the variance. Its standard deviation is ``jitter`` at rest (twice that for hands) and grows by ``blur``
     times the way the point goes in a frame. A point is lost for a frame with probability ``loss`` (three times that
-    for hands), a tenth of it more for every pixel on its way; it then stays where it was last seen, with confidence 0.
+    for hands), twice that for a point that goes 30 pixels; it then stays where it was last seen, with confidence 0.
     """
 
     jitter: float = 0.6
@@ -113,7 +113,7 @@ class Detector:
         # A Gaussian window of s frames leaves 1 / (2 s sqrt(pi)) of white noise's variance.
         slow *= np.sqrt(2.0 * _WOBBLE * np.sqrt(np.pi))
         error = spread[..., None] * (white + slow) / np.sqrt(2.0)
-        lost = rng.random(points.shape[:2]) < self.loss * (2.0 * hand - 1.0) * (1.0 + 0.1 * speed)
+        lost = rng.random(points.shape[:2]) < self.loss * (2.0 * hand - 1.0) * (1.0 + speed / 30.0)
         lost[0], lost[:, 0] = False, False
         error[:, 0] = 0.0
         seen = np.maximum.accumulate(np.where(lost, 0, np.arange(frames)[:, None]), axis=0)
