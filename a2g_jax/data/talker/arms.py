@@ -4,19 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from a2g_jax.data.talker.gesture_plan import LONG_PAUSE, GestureDraws
 from a2g_jax.data.talker.hand_shapes import Control, rest_control, stroke_controls
 from a2g_jax.data.talker.paths import Track
 from a2g_jax.data.talker.speech import SpeechPlan
 from a2g_jax.data.talker.styles import GestureStyle
-from a2g_jax.data.talker.truth import PhaseSpan, Stroke
+from a2g_jax.data.talker.truth import GestureUnit, PhaseSpan, Stroke
 
 ARRIVAL = 0.82
 """Share of a stroke's minimum-jerk step that has passed at the apex: 96 % of the way is done."""
 
 _BLEND = 0.09
 """A preparation ends this long after its stroke began, seconds: the hand turns in a curve and does not stop."""
+SMALL_BEAT = 0.12
+"""Accents from here on (0 to 1) are felt as small beats where they get no stroke."""
 _MIRROR_LAG = 0.06
 """The second hand follows by up to this much, seconds."""
 
@@ -67,10 +70,8 @@ def plan_arms(
         hands = ("left", "right") if unit.hand == "both" else (unit.hand,)
         lead = dominant if unit.hand == "both" else unit.hand
         timings = [_stroke_timing(stroke, draws.strokes, style, rng) for stroke in strokes]
-        shapes = [
-            stroke_controls(unit.family, unit.place, unit.hand == "both", order, len(strokes), stroke.size, style, rng)
-            for order, stroke in enumerate(strokes)
-        ]
+        shapes = _unit_shapes(strokes, unit, style, rng)
+        offset = rng.normal(0.0, (0.025, 0.045, 0.03))
         for hand in ("left", "right"):
             arm = arms[hand]
             follow = _next_stroke(draws, number, hand)
@@ -81,12 +82,75 @@ def plan_arms(
             else:
                 lag = rng.uniform(-0.01, _MIRROR_LAG)
                 late = [StrokeTiming(timing.begin + lag, timing.end + lag) for timing in timings]
-                mirrored = [_second_hand(shape, style, rng) for shape in shapes]
+                mirrored = [_second_hand(shape, offset, style, rng) for shape in shapes]
                 _gesture(arm, plan, strokes, late, mirrored, follow, unit.holds, style, rng)
     for arm in arms.values():
         arm.mark("rest", arm.free, plan.seconds)
+        _small_beats(arm, plan, draws, style, rng)
+        _fidget(arm, style, rng)
     spans = sorted((span for arm in arms.values() for span in arm.spans), key=lambda span: (span.hand, span.start))
     return {hand: arm.track for hand, arm in arms.items()}, tuple(spans)
+
+
+def _unit_shapes(
+    strokes: Sequence[Stroke], unit: GestureUnit, style: GestureStyle, rng: np.random.Generator
+) -> list[tuple[Control, Control, Control]]:
+    """The strokes of a unit; its place drifts from one to the next."""
+    shapes: list[tuple[Control, Control, Control]] = []
+    drift, before = np.zeros(3), None
+    for order, stroke in enumerate(strokes):
+        shapes.append(
+            stroke_controls(
+                stroke.family,
+                unit.place,
+                unit.hand == "both",
+                order,
+                len(strokes),
+                stroke.size,
+                before,
+                drift,
+                style,
+                rng,
+            )
+        )
+        before = shapes[-1][1]
+        drift = 0.8 * drift + style.radius * rng.normal(0.0, (0.16, 0.18, 0.10))
+    return shapes
+
+
+def _small_beats(
+    arm: _Arm, plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng: np.random.Generator
+) -> None:
+    """Accents too weak for a stroke are felt as small beats of a hand that is up; more in held gestures."""
+    taken = {stroke.syllable for stroke in draws.strokes}
+    for unit in draws.units:
+        if unit.hand not in (arm.hand, "both"):
+            continue
+        first, last = draws.strokes[unit.strokes[0]], draws.strokes[unit.strokes[-1]]
+        for index, syllable in enumerate(plan.syllables):
+            inside = first.apex + 0.2 < syllable.peak < last.apex + last.hold + 0.1
+            if not inside or index in taken or syllable.accent < SMALL_BEAT:
+                continue
+            height = np.zeros(len(arm.rest))
+            size = style.radius * (0.10 + 0.25 * syllable.accent) * rng.uniform(0.6, 1.3)
+            height[:3] = size * np.array([rng.normal(0.0, 0.3), -0.8, 0.4])
+            height[4:6] = rng.normal((0.05, -0.12), 0.06)
+            apex = syllable.peak - 0.05
+            arm.track.add_pulse(height, apex - 0.2, apex, apex + rng.uniform(0.25, 0.4))
+
+
+def _fidget(arm: _Arm, style: GestureStyle, rng: np.random.Generator) -> None:
+    """Resting hands shift now and then."""
+    for span in [span for span in arm.spans if span.phase == "rest"]:
+        now = span.start + rng.uniform(0.2, 1.2)
+        while now < span.end - 0.8:
+            length = rng.uniform(0.35, 0.6)
+            stay = rng.uniform(0.1, 0.9)
+            height = np.zeros(len(arm.rest))
+            height[:3] = style.sway**0.5 * rng.normal(0.0, (0.020, 0.024, 0.020))
+            height[3:6] = rng.normal(0.0, (0.14, 0.10, 0.06))
+            arm.track.add_pulse(height, now, now + length, now + length + stay + 0.4)
+            now += length + stay + rng.exponential(0.9) + 0.2
 
 
 def _next_stroke(draws: GestureDraws, number: int, hand: str) -> Stroke | None:
@@ -102,20 +166,23 @@ def _stroke_timing(
 ) -> StrokeTiming:
     # Larger strokes take a little longer (isochrony), tight sequences force shorter ones.
     gaps = [abs(other.apex - stroke.apex) for other in strokes if other is not stroke]
-    length = (0.27 + 0.30 * style.radius * (0.35 + 0.90 * stroke.size)) / style.speed * rng.uniform(0.9, 1.1)
-    length = float(np.clip(min(length, 0.62 * min(gaps, default=1.0)), 0.18, 0.36))
+    length = (0.26 + 0.20 * style.radius * (0.35 + 0.90 * stroke.size)) / style.speed * rng.uniform(0.9, 1.1)
+    length = float(np.clip(min(length, 0.62 * min(gaps, default=1.0)), 0.18, 0.38))
     begin = stroke.apex - ARRIVAL * length
     return StrokeTiming(begin, begin + length)
 
 
 def _second_hand(
-    shape: tuple[Control, Control, Control], style: GestureStyle, rng: np.random.Generator
+    shape: tuple[Control, Control, Control],
+    offset: Float[np.ndarray, " 3"],
+    style: GestureStyle,
+    rng: np.random.Generator,
 ) -> tuple[Control, Control, Control]:
-    """The same stroke for the other hand: a little smaller, and never an exact mirror image."""
+    """The same stroke for the other hand: smaller, elsewhere by ``offset`` (metres), never a mirror image."""
     ready, apex, bow = shape
     middle = 0.5 * (ready + apex)
-    share = style.symmetry * rng.uniform(0.65, 1.1)
-    wobble = np.concatenate([rng.normal(0.0, 0.020, 3), rng.normal(0.0, 0.10, 3), np.zeros(3)])
+    share = style.symmetry * rng.uniform(0.45, 1.1)
+    wobble = np.concatenate([offset + rng.normal(0.0, 0.022, 3), rng.normal(0.0, 0.10, 3), np.zeros(3)])
     shift = middle + wobble
     return shift + share * (ready - middle), shift + share * (apex - middle), share * bow
 
@@ -124,7 +191,7 @@ def _sympathise(arm: _Arm, strokes: list[Stroke], style: GestureStyle, rng: np.r
     """The idle hand stirs a little with the other hand's strokes."""
     for stroke in strokes:
         height = np.zeros(len(arm.rest))
-        size = style.radius * stroke.size * rng.uniform(0.05, 0.25)
+        size = style.radius * stroke.size * rng.uniform(0.10, 0.40)
         height[:3] = size * np.array([0.1, 0.6, 0.5])
         height[4] = rng.normal(0.0, 0.03)
         arm.track.add_pulse(height, stroke.apex - 0.32, stroke.apex + 0.05, stroke.apex + 0.6)
@@ -181,9 +248,9 @@ def _between(
         return begin
     # The hand sinks back and closes a little, as if the effort had left it.
     relax = arm.track.goal.copy()
-    ease = (1.0 - 0.6 * min(style.tension, 1.0)) * rng.uniform(0.18, 0.42)
+    ease = (1.0 - 0.6 * min(style.tension, 1.0)) * rng.uniform(0.22, 0.5)
     relax[:6] += ease * (arm.rest - arm.track.goal)[:6]
-    end = release + rng.uniform(0.45, 0.65) / style.speed
+    end = release + rng.uniform(0.40, 0.60) / style.speed
     arm.track.step_to(relax, release, end)
     let_go, middle = max(release, before.end), max(min(end, begin), before.end)
     arm.mark("hold", before.end, let_go)
@@ -202,7 +269,7 @@ def _retract(
     rng: np.random.Generator,
 ) -> None:
     """Hold, then lead the arm back to rest; part of the way where the next unit follows soon."""
-    length = rng.uniform(0.70, 1.05) / style.speed
+    length = rng.uniform(0.60, 0.95) / style.speed
     begin = timing.end + stroke.hold - 0.04
     pause = _next_pause(plan, stroke.apex)
     if pause is not None:

@@ -4,9 +4,9 @@ import numpy as np
 
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 
-UPPER_ARM = 0.248
+UPPER_ARM = 0.272
 """Shoulder to elbow, metres."""
-FOREARM = 0.2102
+FOREARM = 0.238
 """Elbow to wrist, metres."""
 THIGH = 0.395
 """Hip to knee, metres."""
@@ -36,8 +36,8 @@ _LEFT_OFFSETS: dict[str, tuple[float, float, float]] = {
     "L_Knee": (0.0, -THIGH, 0.0),
     "L_Ankle": (0.0, -SHIN, 0.0),
     "L_Foot": (0.0, -0.060, 0.130),
-    "L_Collar": (0.040, 0.120, 0.0),
-    "L_Shoulder": (0.105, 0.022, -0.004),
+    "L_Collar": (0.042, 0.122, 0.0),
+    "L_Shoulder": (0.130, 0.020, -0.004),
     "L_Elbow": (UPPER_ARM, 0.0, 0.0),
     "L_Wrist": (FOREARM, 0.0, 0.0),
 }
@@ -69,7 +69,8 @@ TALKER_SKELETON = Skeleton(
 )
 """Rest skeleton, T-pose along +-X, feet on y = 0 when the pelvis is at :data:`PELVIS_HEIGHT`.
 
-Wrist to wrist 1.2064 m, the reference length by which the Audio2Gestures papers scale position errors.
+Wrist to wrist 1.364 m, finger tips 1.73 m apart stretched: an adult's proportions. (The 1.2064 m of the
+Audio2Gestures papers is the length by which they scale position errors, not a body's.)
 The head's end is the crown (1.70 m), the wrists' ends are finger tips, the feet's ends are toes.
 """
 

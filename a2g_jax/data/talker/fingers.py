@@ -13,7 +13,7 @@ from jaxtyping import Float
 from a2g_jax.data.talker.body import FINGERS
 from a2g_jax.data.talker.gesture_plan import GestureDraws
 from a2g_jax.data.talker.ik import Rotations, turn
-from a2g_jax.data.talker.paths import Track, draw_waves, softplus
+from a2g_jax.data.talker.paths import Track, draw_waves, soft_clip
 from a2g_jax.data.talker.styles import GestureStyle
 from a2g_jax.data.talker.truth import GestureUnit, PhaseSpan
 
@@ -172,7 +172,7 @@ def finger_rotations(
     stiff = 1.0 - 0.6 * min(style.tension, 1.0)
     local = np.empty((len(times), 15, 3, 3))
     for number, finger in enumerate(FINGERS):
-        values = _limited(track.sample(times - stiff * _LAGS[finger]) + idle)
+        values = soft_clip(track.sample(times - stiff * _LAGS[finger]) + idle, SOFT_LIMITS, 0.05)
         joints = _thumb(values) if finger == "Thumb" else _finger(values, finger)
         local[:, 3 * number : 3 * number + 3] = np.stack(joints, axis=1)
     if side < 0:
@@ -180,12 +180,6 @@ def finger_rotations(
         mirror = np.array([-1.0, 1.0, 1.0])
         local *= mirror[:, None] * mirror
     return local
-
-
-def _limited(values: Float[np.ndarray, "T 12"]) -> Float[np.ndarray, "T 12"]:
-    low, high = SOFT_LIMITS.T
-    width = 0.05
-    return high - softplus(high - (low + softplus(values - low, width)), width)
 
 
 def _finger(values: Float[np.ndarray, "T 12"], finger: str) -> tuple[Rotations, Rotations, Rotations]:

@@ -19,6 +19,8 @@ UNIT_GAP = 1.6
 """Strokes further apart than this (seconds) belong to different units."""
 UNIT_STROKES = 5
 """A unit has at most this many strokes."""
+FAMILY_CHANGE = 0.18
+"""Probability that a stroke after a unit's first is of another family than the unit."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class GestureDraws:
             total += math.log(family_probabilities(style, unit.hand)[FAMILIES.index(unit.family)])
             total += math.log(style.places[PLACES.index(unit.place)])
             total += math.log(style.hold if unit.holds else 1.0 - style.hold)
+            for index in unit.strokes[1:]:
+                family = self.strokes[index].family
+                if family == unit.family:
+                    total += math.log(1.0 - FAMILY_CHANGE)
+                else:
+                    total += math.log(FAMILY_CHANGE)
+                    total += math.log(other_families(style, unit.hand, unit.family)[FAMILIES.index(family)])
         return total
 
 
@@ -58,6 +67,13 @@ def family_probabilities(style: GestureStyle, hand: str) -> tuple[float, ...]:
     allowed = {"frame": 0.0} if hand != "both" else {"point": 0.15, "list": 0.4}
     weights = [weight * allowed.get(name, 1.0) for name, weight in zip(FAMILIES, style.families, strict=True)]
     return tuple(weight / sum(weights) for weight in weights)
+
+
+def other_families(style: GestureStyle, hand: str, family: str) -> tuple[float, ...]:
+    """Probabilities of the families of a stroke that is not of its unit's ``family``."""
+    chances = family_probabilities(style, hand)
+    rest = 1.0 - chances[FAMILIES.index(family)]
+    return tuple(0.0 if name == family else chance / rest for name, chance in zip(FAMILIES, chances, strict=True))
 
 
 def accented_syllables(plan: SpeechPlan, threshold: float, spacing: float) -> list[int]:
@@ -112,7 +128,9 @@ def draw_gestures(plan: SpeechPlan, style: GestureStyle, rng: np.random.Generato
         family = FAMILIES[rng.choice(len(FAMILIES), p=family_probabilities(style, hand))]
         place = PLACES[rng.choice(len(PLACES), p=style.places)]
         holds = bool(rng.random() < style.hold)
-        for position in positions:
+        for order, position in enumerate(positions):
+            other = order > 0 and rng.random() < FAMILY_CHANGE
+            chances = other_families(style, hand, family)
             syllable = plan.syllables[syllables[position]]
             strokes.append(
                 Stroke(
@@ -120,7 +138,7 @@ def draw_gestures(plan: SpeechPlan, style: GestureStyle, rng: np.random.Generato
                     syllable=syllables[position],
                     size=min(max(syllable.accent, 0.0), 1.0),
                     hand=hand,
-                    family=family,
+                    family=FAMILIES[rng.choice(len(FAMILIES), p=chances)] if other else family,
                     hold=float(rng.uniform(0.3, 0.9)) if holds else float(rng.uniform(0.02, 0.10)),
                     unit=len(units),
                 )

@@ -17,16 +17,16 @@ from a2g_jax.data.talker.styles import GestureStyle
 CHANNELS = 9
 Control = Float[np.ndarray, " 9"]
 
-_SHOULDER = np.array([0.145, 0.142, 0.0])
+_SHOULDER = np.array([0.172, 0.142, 0.0])
 """The shoulder from the chest joint, metres: out, up, forward."""
-_COMFORT = 0.925 * (UPPER_ARM + FOREARM)
-"""Strokes lead no further from the shoulder than this, metres: elbows stay bent by 45 degrees or more."""
+_COMFORT = 0.945 * (UPPER_ARM + FOREARM)
+"""Strokes lead no further from the shoulder than this, metres: elbows stay bent by 38 degrees or more."""
 
 _PLACES: dict[str, tuple[float, float, float]] = {
-    "center": (0.14, -0.08, 0.25),
-    "low": (0.17, -0.13, 0.23),
-    "high": (0.18, 0.01, 0.26),
-    "wide": (0.24, -0.09, 0.21),
+    "center": (0.155, -0.085, 0.295),
+    "low": (0.20, -0.20, 0.25),
+    "high": (0.20, 0.075, 0.29),
+    "wide": (0.31, -0.07, 0.23),
 }
 
 
@@ -47,12 +47,12 @@ def control(
 def rest_control(rest_pose: str, dominant: bool) -> Control:
     """The arm's control at rest; the dominant hand lies over the other."""
     if rest_pose == "sides":
-        return control((0.208, -0.303, 0.035), supination=-12.0, palmar=12.0, radial=-4.0, elbow=0.35)
+        return control((0.246, -0.348, 0.040), supination=-12.0, palmar=12.0, radial=-4.0, elbow=0.35, life=0.9)
     if rest_pose == "belly":
-        place = (0.075, -0.135, 0.185) if dominant else (0.088, -0.165, 0.165)
-        return control(place, supination=-22.0 if dominant else 8.0, palmar=28.0, radial=2.0, elbow=0.62)
-    place = (0.062, -0.205, 0.190) if dominant else (0.066, -0.222, 0.180)
-    return control(place, supination=-28.0 if dominant else -14.0, palmar=24.0, radial=-6.0, elbow=0.55)
+        place = (0.085, -0.130, 0.200) if dominant else (0.100, -0.165, 0.180)
+        return control(place, supination=-22.0 if dominant else 8.0, palmar=28.0, radial=2.0, elbow=0.62, life=0.7)
+    place = (0.072, -0.205, 0.215) if dominant else (0.078, -0.228, 0.200)
+    return control(place, supination=-28.0 if dominant else -14.0, palmar=24.0, radial=-6.0, elbow=0.55, life=0.65)
 
 
 def _at_most(value: float, most: float, width: float) -> float:
@@ -66,7 +66,7 @@ def _within_reach(place: Float[np.ndarray, " 3"], closest: float) -> tuple[float
     """
     out, up, fwd = place
     out = -_at_most(-out, -closest, 0.02)
-    out, up, fwd = _at_most(out, 0.42, 0.04), _at_most(up, 0.13, 0.03), -_at_most(-fwd, -0.19, 0.03)
+    out, up, fwd = _at_most(out, 0.50, 0.04), _at_most(up, 0.20, 0.03), -_at_most(-fwd, -0.19, 0.03)
     away = np.array([out, up, fwd]) - _SHOULDER
     reach = float(np.linalg.norm(away))
     comfort = _at_most(reach, _COMFORT, 0.02)
@@ -91,10 +91,10 @@ class _Shape:
 
 _SHAPES: dict[str, _Shape] = {
     # Palm in, a flick down and forward.
-    "beat": _Shape((-0.08, 0.36, -0.1), (0.1, -0.36, 0.18), (0.02, 0.0, 0.1), (10.0, -4.0, 16.0), (4.0, 4.0, -14.0)),
+    "beat": _Shape((-0.08, 0.34, -0.16), (0.1, -0.34, 0.24), (0.02, 0.0, 0.12), (10.0, -4.0, 16.0), (4.0, 4.0, -14.0)),
     # Opens outward and forward through a low arc until the palm is up.
     "offer": _Shape(
-        (-0.34, 0.1, -0.14), (0.42, -0.1, 0.3), (0.0, -0.14, 0.04), (18.0, 18.0, 4.0), (68.0, -16.0, -6.0), (0.0, -0.05)
+        (-0.32, 0.1, -0.2), (0.4, -0.08, 0.34), (0.0, -0.16, 0.04), (18.0, 18.0, 4.0), (68.0, -16.0, -6.0), (0.0, -0.05)
     ),
     # Palm down, sideways; the wrist trails.
     "sweep": _Shape(
@@ -121,6 +121,8 @@ def stroke_controls(
     order: int,
     count: int,
     size: float,
+    before: Control | None,
+    drift: Float[np.ndarray, " 3"],
     style: GestureStyle,
     rng: np.random.Generator,
 ) -> tuple[Control, Control, Control]:
@@ -129,16 +131,21 @@ def stroke_controls(
     Args:
         order, count: which stroke of how many in the unit.
         size: 0 to 1, from the accent.
+        before: where the unit's last stroke arrived; the hand does not go all the way back to begin anew.
+        drift: how far the unit has wandered from its place, metres.
     """
     shape = _SHAPES[family]
-    radius = style.radius * (0.35 + 0.90 * size) * rng.uniform(0.78, 1.2)
-    center = np.array(_PLACES[place]) + np.array([style.spread, style.height, 0.0])
-    center += rng.normal(0.0, (0.026, 0.024, 0.016))
+    radius = style.radius * (0.35 + 0.90 * size) * rng.uniform(0.75, 1.3)
+    center = np.array(_PLACES[place]) + np.array([style.spread, style.height, 0.0]) + drift
+    center += rng.normal(0.0, (0.036, 0.046, 0.042))
     center[0] += _ADVANCE.get(family, 0.0) * (order / max(count - 1, 1) - 0.5) * radius
     # Sweeps go out and come back.
     back = -0.8 if family == "sweep" and order % 2 else 1.0
     mild = np.array([1.0, 1.0 - 0.6 * min(style.tension, 1.0), 1.0 - 0.6 * min(style.tension, 1.0)])
     jitter = rng.normal(0.0, (5.0, 4.0, 3.0), (2, 3))
+    # No two strokes of a unit take the same direction: they lean to one side and the other.
+    tilt = rng.normal(0.0, 0.30) + (0.22 if order % 2 else -0.12)
+    turned = np.array([[np.cos(tilt), -np.sin(tilt), 0.0], [np.sin(tilt), np.cos(tilt), 0.0], [0.0, 0.0, 1.0]])
     ends = []
     for offset, hand, elbow, noise in (
         (shape.begin, shape.begin_hand, shape.elbow[0], jitter[0]),
@@ -147,7 +154,7 @@ def stroke_controls(
         supination, palmar, radial = (mild * np.array(hand) + noise).tolist()
         ends.append(
             control(
-                _within_reach(center + back * radius * np.array(offset), 0.125 if two_handed else 0.03),
+                _within_reach(center + back * radius * (turned @ np.array(offset)), 0.125 if two_handed else 0.03),
                 supination,
                 back * palmar,
                 radial,
@@ -157,5 +164,8 @@ def stroke_controls(
             )
         )
     bow = np.zeros(CHANNELS)
-    bow[:3] = radius * np.array(shape.bow)
-    return ends[0], ends[1], bow
+    bow[:3] = radius * np.array(shape.bow) * rng.uniform(-0.4, 1.8) + radius * rng.normal(0.0, 0.07, 3)
+    begin, arrive = ends
+    if before is not None:
+        begin = begin + rng.uniform(0.0, 0.4) * (before - begin)
+    return begin, arrive, bow

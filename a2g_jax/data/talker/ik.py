@@ -13,7 +13,7 @@ _SHORTEST, _LONGEST = 0.40, 0.994
 """Reach as a share of the limb's length: elbow flexion between about 13 and 133 degrees."""
 
 
-_TWIST = np.deg2rad(85.0)
+_TWIST = np.deg2rad(79.0)
 """Most supination and pronation."""
 
 

@@ -28,6 +28,14 @@ def softplus(x: Float[np.ndarray, "*any"], width: float) -> Float[np.ndarray, "*
     return width * np.logaddexp(0.0, x / width)
 
 
+def soft_clip(
+    values: Float[np.ndarray, "T C"], limits: Float[np.ndarray, "C 2"], width: float
+) -> Float[np.ndarray, "T C"]:
+    """Channels kept strictly between their ``limits`` (least, most), smoothly; unchanged a few ``width`` inside."""
+    low, high = limits.T
+    return high - softplus(high - (low + softplus(values - low, width)), width)
+
+
 @dataclass
 class Track:
     """A path of C channels built from steps and bumps, then sampled at any times."""

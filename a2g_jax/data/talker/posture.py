@@ -68,9 +68,9 @@ def plan_posture(plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng
     _shift_gaze(track, plan.seconds, style, rng)
     _nod(track, plan, style, rng)
     _follow_arms(track, draws, style, rng)
-    degrees = np.deg2rad([1.2, 0.5, 0.6, 2.0, 1.1, 1.2, 2.4, 1.5, 1.5])
-    sizes = np.concatenate([[0.015, 0.001, 0.014], degrees]) * style.sway
-    sway = draw_waves(rng, sizes, 0.07, 0.75)
+    degrees = np.deg2rad([2.4, 0.7, 1.0, 5.2, 2.8, 3.2, 3.8, 2.6, 3.4])
+    sizes = np.concatenate([[0.017, 0.0012, 0.015], degrees]) * style.sway
+    sway = draw_waves(rng, sizes, 0.08, 1.3)
     breath = (rng.uniform(0.21, 0.29), rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, 2.0 * np.pi))
     return PosturePlan(stance, track, sway, breath)
 
@@ -88,9 +88,9 @@ def _shift_weight(track: Track, seconds: float, posture: str, style: GestureStyl
     base = track.start.copy()
 
     def targets() -> dict[int, float]:
-        side = home + rng.normal(0.0, 0.022 * style.sway)
+        side = home + rng.normal(0.0, 0.028 * style.sway)
         roll = 1.25 * side + np.deg2rad(rng.normal(0.0, 0.3))
-        yaw = np.deg2rad(rng.normal(0.0, 3.5 * style.sway))
+        yaw = np.deg2rad(rng.normal(0.0, 5.0 * style.sway))
         return {
             0: side,
             1: base[1] - 0.12 * abs(side),
@@ -105,9 +105,9 @@ def _shift_weight(track: Track, seconds: float, posture: str, style: GestureStyl
         track.start[channel] = value
     now = rng.uniform(1.0, 4.0)
     while now < seconds:
-        length = rng.uniform(0.9, 1.9)
+        length = rng.uniform(0.8, 1.6)
         _move(track, targets(), now, now + length)
-        now += length + rng.uniform(0.8, 4.5)
+        now += length + rng.uniform(0.5, 3.5)
 
 
 def _shift_gaze(track: Track, seconds: float, style: GestureStyle, rng: np.random.Generator) -> None:
@@ -119,11 +119,11 @@ def _shift_gaze(track: Track, seconds: float, style: GestureStyle, rng: np.rando
     while now < seconds:
         length = rng.uniform(0.35, 0.75)
         target = np.deg2rad(rng.normal(0.0, style.gaze))
-        roll = np.deg2rad(rng.normal(0.0, 2.2)) - 0.08 * target
-        pitch = level + np.deg2rad(rng.normal(0.0, 2.4))
+        roll = np.deg2rad(rng.normal(0.0, 2.8)) - 0.08 * target
+        pitch = level + np.deg2rad(rng.normal(0.0, 3.2))
         _move(track, {9: 0.8 * target, 10: roll, 11: pitch}, now, now + length)
-        _move(track, {6: follow[6] + 0.25 * target}, now + 0.1, now + 0.25 + 1.8 * length)
-        now += length + rng.exponential(1.4) + 0.5
+        _move(track, {6: follow[6] + 0.4 * target}, now + 0.1, now + 0.25 + 1.8 * length)
+        now += length + rng.exponential(1.2) + 0.4
 
 
 def _nod(track: Track, plan: SpeechPlan, style: GestureStyle, rng: np.random.Generator) -> None:
@@ -150,9 +150,9 @@ def _follow_arms(track: Track, draws: GestureDraws, style: GestureStyle, rng: np
     for unit in draws.units:
         strokes = [draws.strokes[index] for index in unit.strokes]
         side = {"left": 1.0, "right": -1.0, "both": 0.0}[unit.hand]
-        reach = style.radius / 0.2
+        reach = style.radius / 0.40
         turn = np.zeros(CHANNELS)
-        turn[6] = np.deg2rad(rng.uniform(1.5, 5.0)) * side * reach
+        turn[6] = np.deg2rad(rng.uniform(2.0, 8.0)) * side * reach
         turn[7] = -np.deg2rad(rng.uniform(0.0, 1.8)) * side * reach
         turn[8] = np.deg2rad(rng.uniform(0.0, 2.5))
         turn[9] = -0.5 * turn[6]
@@ -160,9 +160,9 @@ def _follow_arms(track: Track, draws: GestureDraws, style: GestureStyle, rng: np
         track.add_pulse(turn, strokes[0].apex - 0.75, strokes[0].apex + 0.1, strokes[-1].apex + rng.uniform(1.0, 1.8))
         for stroke in strokes:
             push = np.zeros(CHANNELS)
-            push[6] = np.deg2rad(rng.normal(2.2, 1.2)) * (side or rng.choice((-0.6, 0.6))) * stroke.size * reach
-            push[7] = np.deg2rad(rng.normal(0.0, 1.3)) * stroke.size
-            push[8] = np.deg2rad(rng.uniform(1.1, 3.3)) * stroke.size * reach
+            push[6] = np.deg2rad(rng.normal(6.0, 3.0)) * (side or rng.choice((-0.6, 0.6))) * stroke.size * reach
+            push[7] = np.deg2rad(rng.normal(0.0, 3.0)) * stroke.size
+            push[8] = np.deg2rad(rng.uniform(2.5, 7.0)) * stroke.size * reach
             push[11] = -0.5 * push[8]
             push[1] = -0.002 * stroke.size
             track.add_pulse(push, stroke.apex - 0.32, stroke.apex + 0.05, stroke.apex + 0.6)

@@ -3,23 +3,29 @@
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.talker.body import TORSO_HALF_AXES
-from a2g_jax.data.talker.ik import Vectors, rotate, turn
+from a2g_jax.data.talker.body import HAND, TORSO_HALF_AXES
+from a2g_jax.data.talker.ik import Rotations, Vectors, rotate
 from a2g_jax.data.talker.paths import softplus
 
 _CLEARANCE = 0.085
 """Least lateral distance between the wrists, metres: hands fold over each other but never change sides."""
 
 
+_HANDS_APART = 0.06
+"""Least distance between the middle lines of the hands, metres: two hands' thickness."""
+_HAND_POINTS = (0.15, 0.55, 1.0)
+"""Points of a hand that are kept clear, as shares of its length."""
+
+
 def wrist_targets(
-    controls: dict[str, Float[np.ndarray, "T 9"]], chest: Vectors, pelvis: Vectors, neck: Vectors, yaw: np.ndarray
+    controls: dict[str, Float[np.ndarray, "T 9"]], chest: Vectors, pelvis: Vectors, neck: Vectors, facing: Rotations
 ) -> dict[str, Vectors]:
     """World positions for both wrists from the arms' controls.
 
     Args:
         controls: channels of :mod:`a2g_jax.data.talker.hand_shapes`, by hand.
         chest, pelvis, neck: joint positions in the world.
-        yaw: where the chest faces, radians; the gesture space turns with it but stays upright.
+        facing: upright axes that turn with the chest: those of the gesture space.
     """
     local = {}
     for hand, side in (("left", 1.0), ("right", -1.0)):
@@ -28,11 +34,39 @@ def wrist_targets(
     apart = 0.5 * (_CLEARANCE + softplus(gap - _CLEARANCE, 0.03) - gap)
     local["left"][:, 0] += apart
     local["right"][:, 0] -= apart
-    facing = turn(1, yaw)
     return {hand: outside_torso(chest + rotate(facing, place), pelvis, neck, facing) for hand, place in local.items()}
 
 
-def torso_distance(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Float[np.ndarray, "T 3 3"]) -> tuple:
+def clear_hands(
+    hands: dict[str, tuple[Vectors, Rotations]], pelvis: Vectors, neck: Vectors, facing: Rotations
+) -> dict[str, Vectors]:
+    """How far both wrists have to move for palms and fingers to clear the torso and each other.
+
+    Args:
+        hands: wrist position and the hand's axes in the world, by hand.
+        pelvis, neck, facing: as in :func:`wrist_targets`.
+    """
+    points, change = {}, {}
+    for hand, side in (("left", 1.0), ("right", -1.0)):
+        wrist, palm = hands[hand]
+        points[hand] = [wrist + rotate(palm, np.array([side * share * HAND, 0.0, 0.0])) for share in _HAND_POINTS]
+        pushes = [outside_torso(point, pelvis, neck, facing) - point for point in points[hand][1:]]
+        sizes = [np.linalg.norm(push, axis=1, keepdims=True) for push in pushes]
+        total = sum(size * push for size, push in zip(sizes, pushes, strict=True))
+        change[hand] = total / (sum(sizes) + 1e-4)
+    gaps = np.stack([left - right for left in points["left"] for right in points["right"]])
+    distances = np.linalg.norm(gaps, axis=2)
+    weights = np.exp(-(distances - distances.min(axis=0)) / 0.015)
+    weights /= weights.sum(axis=0)
+    distance = np.sum(weights * distances, axis=0)
+    # Apart sideways where the hands meet point to point, else along what lies between them.
+    away = np.einsum("pt,pti->ti", weights, gaps) + rotate(facing, np.array([0.02, 0.0, 0.0]))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    push = 0.5 * softplus(_HANDS_APART - distance, 0.012)[:, None] * away
+    return {"left": change["left"] + push, "right": change["right"] - push}
+
+
+def torso_distance(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Rotations) -> tuple:
     """Horizontal offset of points from the torso's middle line, in half axes of the torso, and that line's point."""
     share = (points[:, 1] - pelvis[:, 1]) / (neck[:, 1] - pelvis[:, 1])
     middle = pelvis + share[:, None] * (neck - pelvis)
@@ -41,7 +75,7 @@ def torso_distance(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Floa
     return offset / np.array([TORSO_HALF_AXES[0], 1.0, TORSO_HALF_AXES[1]]), middle
 
 
-def outside_torso(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Float[np.ndarray, "T 3 3"]) -> Vectors:
+def outside_torso(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Rotations) -> Vectors:
     """Push points out of the torso's elliptic capsule, smoothly and straight away from its middle line."""
     scaled, _ = torso_distance(points, pelvis, neck, facing)
     depth = np.linalg.norm(scaled, axis=1)

@@ -16,7 +16,7 @@ class Stroke:
     hand: str
     """'left', 'right' or 'both'. Hidden: drawn per gesture unit."""
     family: str
-    """'beat', 'offer', 'sweep', 'point', 'list' or 'frame'. Hidden: drawn per gesture unit."""
+    """'beat', 'offer', 'sweep', 'point', 'list' or 'frame'. Hidden: the unit's, or now and then another one."""
     hold: float
     """Post-stroke hold in seconds, where the next movement leaves room for it. Hidden."""
     unit: int
@@ -32,7 +32,7 @@ class GestureUnit:
     hand: str
     """'left', 'right' or 'both'. Hidden."""
     family: str
-    """As in :attr:`Stroke.family`. Hidden."""
+    """Family of its first stroke and of most others (see :attr:`Stroke.family`). Hidden."""
     place: str
     """'center', 'low', 'high' or 'wide' in the gesture space. Hidden."""
     holds: bool
