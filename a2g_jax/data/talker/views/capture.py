@@ -43,8 +43,8 @@ def add_jitter(motion: Motion, degrees: float, rng: np.random.Generator, skate: 
     jumps to where it should be, come 0.4 times a minute and joint for every degree.
 
     At 30 frames per second the wrists' root-mean-square jerk (third difference of their position) grows by a factor of
-    about 6 at half a degree, 11 at one, 28 at 2.5 and 56 at 5 degrees: means over one recording of each speaker, of
-    which the liveliest grow half as much and the calmest nearly twice.
+    about 4 at half a degree, 7 at one, 18 at 2.5 and 35 at 5 degrees: means over one recording of each speaker; the
+    liveliest grow by 0.6 times as much and the calmest by 1.5 times.
 
     Args:
         motion: on any skeleton.
