@@ -16,7 +16,7 @@ from a2g_jax.data.talker.truth import GestureUnit, PhaseSpan, Stroke
 ARRIVAL = 0.82
 """Share of a stroke's minimum-jerk step that has passed at the apex: 96 % of the way is done."""
 
-_BLEND = 0.09
+_BLEND = 0.07
 """A preparation ends this long after its stroke began, seconds: the hand turns in a curve and does not stop."""
 SMALL_BEAT = 0.12
 """Accents from here on (0 to 1) are felt as small beats where they get no stroke."""
@@ -126,9 +126,10 @@ def _small_beats(
     for unit in draws.units:
         if unit.hand not in (arm.hand, "both"):
             continue
-        first, last = draws.strokes[unit.strokes[0]], draws.strokes[unit.strokes[-1]]
+        apexes = np.array([draws.strokes[index].apex for index in unit.strokes])
+        end = apexes[-1] + draws.strokes[unit.strokes[-1]].hold + 0.1
         for index, syllable in enumerate(plan.syllables):
-            inside = first.apex + 0.2 < syllable.peak < last.apex + last.hold + 0.1
+            inside = apexes[0] < syllable.peak < end and np.abs(apexes - syllable.peak).min() > 0.3
             if not inside or index in taken or syllable.accent < SMALL_BEAT:
                 continue
             height = np.zeros(len(arm.rest))
@@ -166,8 +167,8 @@ def _stroke_timing(
 ) -> StrokeTiming:
     # Larger strokes take a little longer (isochrony), tight sequences force shorter ones.
     gaps = [abs(other.apex - stroke.apex) for other in strokes if other is not stroke]
-    length = (0.26 + 0.20 * style.radius * (0.35 + 0.90 * stroke.size)) / style.speed * rng.uniform(0.9, 1.1)
-    length = float(np.clip(min(length, 0.62 * min(gaps, default=1.0)), 0.18, 0.38))
+    length = (0.26 + 0.20 * style.radius * (0.25 + 1.05 * stroke.size)) / style.speed * rng.uniform(0.9, 1.1)
+    length = float(np.clip(min(length, 0.62 * min(gaps, default=1.0)), 0.18, 0.34))
     begin = stroke.apex - ARRIVAL * length
     return StrokeTiming(begin, begin + length)
 
@@ -238,7 +239,7 @@ def _between(
 ) -> float:
     """What the hand does between two strokes of a unit; returns when the next preparation begins."""
     gap = timing.begin - before.end
-    prepare = min(rng.uniform(0.32, 0.5) / style.speed, max(gap + 0.08, 0.16))
+    prepare = min(rng.uniform(0.32, 0.5) / style.speed, max(gap + 0.08, 0.2))
     begin = timing.begin - prepare
     release = before.end + (stroke.hold if holds else 0.0) - 0.05
     if timing.begin - release < 0.5:

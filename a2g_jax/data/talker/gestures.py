@@ -59,7 +59,7 @@ def gesticulate(
         values[:, :7] += values[:, 8:] * idle[hand].sample(times)
         controls[hand] = values
     channels, breath = posture.sample(times)
-    rotations, root = pose_body(channels, breath, controls, posture.stance)
+    rotations, root = pose_body(channels, breath, controls, posture.stance, -1.0 if style.right_handed >= 0.5 else 1.0)
     truth = GestureTruth(
         strokes=draws.strokes,
         phases=phases,

@@ -21,6 +21,8 @@ _SHOULDER = np.array([0.172, 0.142, 0.0])
 """The shoulder from the chest joint, metres: out, up, forward."""
 _COMFORT = 0.945 * (UPPER_ARM + FOREARM)
 """Strokes lead no further from the shoulder than this, metres: elbows stay bent by 38 degrees or more."""
+_CLOSEST = 0.27
+"""Nor closer to it than this, metres: an arm folded further is an arm in the way."""
 
 _PLACES: dict[str, tuple[float, float, float]] = {
     "center": (0.155, -0.085, 0.295),
@@ -49,9 +51,9 @@ def rest_control(rest_pose: str, dominant: bool) -> Control:
     if rest_pose == "sides":
         return control((0.246, -0.348, 0.040), supination=-12.0, palmar=12.0, radial=-4.0, elbow=0.35, life=0.9)
     if rest_pose == "belly":
-        place = (0.085, -0.130, 0.200) if dominant else (0.100, -0.165, 0.180)
+        place = (0.088, -0.130, 0.220) if dominant else (0.102, -0.168, 0.178)
         return control(place, supination=-22.0 if dominant else 8.0, palmar=28.0, radial=2.0, elbow=0.62, life=0.7)
-    place = (0.072, -0.205, 0.215) if dominant else (0.078, -0.228, 0.200)
+    place = (0.080, -0.205, 0.235) if dominant else (0.082, -0.228, 0.190)
     return control(place, supination=-28.0 if dominant else -14.0, palmar=24.0, radial=-6.0, elbow=0.55, life=0.65)
 
 
@@ -69,7 +71,7 @@ def _within_reach(place: Float[np.ndarray, " 3"], closest: float) -> tuple[float
     out, up, fwd = _at_most(out, 0.50, 0.04), _at_most(up, 0.20, 0.03), -_at_most(-fwd, -0.19, 0.03)
     away = np.array([out, up, fwd]) - _SHOULDER
     reach = float(np.linalg.norm(away))
-    comfort = _at_most(reach, _COMFORT, 0.02)
+    comfort = -_at_most(-_at_most(reach, _COMFORT, 0.02), -_CLOSEST, 0.02)
     out, up, fwd = _SHOULDER + away * (comfort / reach)
     return float(out), float(up), float(fwd)
 
@@ -135,7 +137,7 @@ def stroke_controls(
         drift: how far the unit has wandered from its place, metres.
     """
     shape = _SHAPES[family]
-    radius = style.radius * (0.35 + 0.90 * size) * rng.uniform(0.75, 1.3)
+    radius = style.radius * (0.25 + 1.05 * size) * rng.uniform(0.75, 1.3)
     center = np.array(_PLACES[place]) + np.array([style.spread, style.height, 0.0]) + drift
     center += rng.normal(0.0, (0.036, 0.046, 0.042))
     center[0] += _ADVANCE.get(family, 0.0) * (order / max(count - 1, 1) - 0.5) * radius
@@ -154,7 +156,7 @@ def stroke_controls(
         supination, palmar, radial = (mild * np.array(hand) + noise).tolist()
         ends.append(
             control(
-                _within_reach(center + back * radius * (turned @ np.array(offset)), 0.125 if two_handed else 0.03),
+                _within_reach(center + back * radius * (turned @ np.array(offset)), 0.13 if two_handed else 0.07),
                 supination,
                 back * palmar,
                 radial,

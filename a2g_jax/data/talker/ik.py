@@ -9,8 +9,8 @@ Vectors = Float[np.ndarray, "T 3"]
 Rotations = Float[np.ndarray, "T 3 3"]
 Angles = Float[np.ndarray, " T"]
 
-_SHORTEST, _LONGEST = 0.40, 0.994
-"""Reach as a share of the limb's length: elbow flexion between about 13 and 133 degrees."""
+_SHORTEST, _LONGEST = 0.38, 0.992
+"""Reach as a share of the limb's length: elbow flexion between about 14 and 135 degrees."""
 
 
 _TWIST = np.deg2rad(79.0)
@@ -45,8 +45,8 @@ def _unit(vectors: Vectors) -> Vectors:
 
 def soft_reach(reach: Angles, length: float) -> Angles:
     """Limit a limb's reach smoothly, so that a target out of reach is approached and never snapped to."""
-    reach = _SHORTEST * length + softplus(reach - _SHORTEST * length, 0.01)
-    return _LONGEST * length - softplus(_LONGEST * length - reach, 0.006)
+    reach = _SHORTEST * length + softplus(reach - _SHORTEST * length, 0.03)
+    return _LONGEST * length - softplus(_LONGEST * length - reach, 0.010)
 
 
 def bend(

@@ -44,16 +44,18 @@ def pose_body(
     breath: Float[np.ndarray, " T"],
     controls: dict[str, Float[np.ndarray, "T 9"]],
     stance: Stance,
+    over: float,
 ) -> tuple[Float[np.ndarray, "T J 3 3"], Vectors]:
     """Local rotations and root path.
 
     Args:
         channels, breath, stance: of :class:`~a2g_jax.data.talker.posture.PosturePlan`.
         controls: of both arms, see :mod:`a2g_jax.data.talker.hand_shapes`.
+        over: which hand lies over the other where they meet: +1 the left one, -1 the right one.
     """
     count = len(channels)
     channels = np.concatenate(
-        [soft_clip(channels[:, :3], _SHIFT_LIMITS, 0.008), soft_clip(channels[:, 3:], _TURN_LIMITS, 0.04)], axis=1
+        [soft_clip(channels[:, :3], _SHIFT_LIMITS, 0.02), soft_clip(channels[:, 3:], _TURN_LIMITS, 0.04)], axis=1
     )
     local = np.tile(np.eye(3), (count, len(BODY_JOINTS), 1, 1))
     pelvis_turn = yaw_roll_pitch(*channels[:, 3:6].T)
@@ -74,9 +76,9 @@ def pose_body(
 
     trunk = _Trunk(chest, chest_turn, root, neck, turn(1, channels[:, 3] + channels[:, 6]))
     targets = wrist_targets(controls, chest, root, neck, trunk.facing)
-    arms = {hand: _solve_arm(trunk, controls[hand], targets[hand], breath, hand) for hand in targets}
     # Palms and fingers have no channels of their own: where they touch something, the whole hand moves away.
-    moved = clear_hands({hand: (arm.wrist, arm.palm) for hand, arm in arms.items()}, root, neck, trunk.facing)
+    arms = {hand: _solve_arm(trunk, controls[hand], targets[hand], breath, hand) for hand in targets}
+    moved = clear_hands({hand: (arm.wrist, arm.palm) for hand, arm in arms.items()}, root, neck, trunk.facing, over)
     for hand, change in moved.items():
         arm = _solve_arm(trunk, controls[hand], targets[hand] + change, breath, hand)
         for name, rotation in arm.local.items():
@@ -96,7 +98,7 @@ def _stand(root: Vectors, pelvis_turn: Rotations, stance: Stance) -> Float[np.nd
         away = _ankle(stance, side) - root - hip
         limit = np.sqrt((0.995 * (body.THIGH + body.SHIN)) ** 2 - away[:, 0] ** 2 - away[:, 2] ** 2)
         limit = limit + body.ANKLE_HEIGHT - hip[:, 1]
-        height = limit - softplus(limit - height, 0.003)
+        height = limit - softplus(limit - height, 0.006)
     return height
 
 
@@ -142,12 +144,13 @@ def _solve_arm(
     collar_turn = trunk.chest_turn @ collar
     shoulder = trunk.chest + rotate(trunk.chest_turn, _OFFSETS[_JOINT[f"{letter}_Collar"]])
     shoulder = shoulder + rotate(collar_turn, _OFFSETS[_JOINT[f"{letter}_Shoulder"]])
-    # Elbows point down and slightly out; behind the body only where the arm hangs.
+    # Elbows point down and slightly out; backward where the arm itself leads that way.
     reach = rotate(np.swapaxes(trunk.facing, 1, 2), target - shoulder)
-    hang = 0.5 * (1.0 + np.tanh((-reach[:, 1] / (np.linalg.norm(reach, axis=1)) - 0.78) / 0.16))
     # They follow a hand that goes far to the side: the upper arm turns outward only so far.
     elbow_out = control[:, 6] + 1.6 * softplus(control[:, 0] - 0.30, 0.04)
-    pole = np.stack([side * elbow_out, np.full(len(hang), -0.9), -0.12 - 0.55 * hang], axis=1)
+    pole = np.stack([side * elbow_out, np.full(len(reach), -0.9), np.zeros(len(reach))], axis=1)
+    same_way = np.sum(pole * reach, axis=1) / np.sqrt(np.sum(pole**2, axis=1) * np.sum(reach**2, axis=1))
+    pole[:, 2] = -0.15 - 0.35 * (1.0 + np.tanh((same_way - 0.74) / 0.2))
     angles = np.concatenate([control[:, 3:4], soft_clip(control[:, 4:6], _WRIST_LIMITS, 0.08)], axis=1)
     upper, elbow, wrist = arm_rotations(
         shoulder, target, rotate(trunk.facing, pole), (body.UPPER_ARM, body.FOREARM), side, angles

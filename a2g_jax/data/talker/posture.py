@@ -68,8 +68,8 @@ def plan_posture(plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng
     _shift_gaze(track, plan.seconds, style, rng)
     _nod(track, plan, style, rng)
     _follow_arms(track, draws, style, rng)
-    degrees = np.deg2rad([2.4, 0.7, 1.0, 5.2, 2.8, 3.2, 3.8, 2.6, 3.4])
-    sizes = np.concatenate([[0.017, 0.0012, 0.015], degrees]) * style.sway
+    degrees = np.deg2rad([2.7, 0.8, 1.2, 5.8, 3.6, 4.0, 4.0, 2.8, 3.6])
+    sizes = np.concatenate([[0.019, 0.0014, 0.018], degrees]) * style.sway
     sway = draw_waves(rng, sizes, 0.08, 1.3)
     breath = (rng.uniform(0.21, 0.29), rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, 2.0 * np.pi))
     return PosturePlan(stance, track, sway, breath)
@@ -150,7 +150,7 @@ def _follow_arms(track: Track, draws: GestureDraws, style: GestureStyle, rng: np
     for unit in draws.units:
         strokes = [draws.strokes[index] for index in unit.strokes]
         side = {"left": 1.0, "right": -1.0, "both": 0.0}[unit.hand]
-        reach = style.radius / 0.40
+        reach = style.radius / 0.43
         turn = np.zeros(CHANNELS)
         turn[6] = np.deg2rad(rng.uniform(2.0, 8.0)) * side * reach
         turn[7] = -np.deg2rad(rng.uniform(0.0, 1.8)) * side * reach

@@ -11,9 +11,11 @@ _CLEARANCE = 0.085
 """Least lateral distance between the wrists, metres: hands fold over each other but never change sides."""
 
 
-_HANDS_APART = 0.06
+_HANDS_APART = 0.045
 """Least distance between the middle lines of the hands, metres: two hands' thickness."""
-_HAND_POINTS = (0.15, 0.55, 1.0)
+_NEARNESS = 0.025
+"""Distances that differ by this much, metres, count about the same."""
+_HAND_POINTS = (0.1, 0.55, 1.0)
 """Points of a hand that are kept clear, as shares of its length."""
 
 
@@ -38,31 +40,34 @@ def wrist_targets(
 
 
 def clear_hands(
-    hands: dict[str, tuple[Vectors, Rotations]], pelvis: Vectors, neck: Vectors, facing: Rotations
+    hands: dict[str, tuple[Vectors, Rotations]], pelvis: Vectors, neck: Vectors, facing: Rotations, over: float
 ) -> dict[str, Vectors]:
     """How far both wrists have to move for palms and fingers to clear the torso and each other.
 
     Args:
         hands: wrist position and the hand's axes in the world, by hand.
         pelvis, neck, facing: as in :func:`wrist_targets`.
+        over: which hand lies over the other where they meet: +1 the left one, -1 the right one.
     """
     points, change = {}, {}
     for hand, side in (("left", 1.0), ("right", -1.0)):
         wrist, palm = hands[hand]
         points[hand] = [wrist + rotate(palm, np.array([side * share * HAND, 0.0, 0.0])) for share in _HAND_POINTS]
-        pushes = [outside_torso(point, pelvis, neck, facing) - point for point in points[hand][1:]]
+        pushes = [outside_torso(point, pelvis, neck, facing, 0.2) - point for point in points[hand][1:]]
         sizes = [np.linalg.norm(push, axis=1, keepdims=True) for push in pushes]
         total = sum(size * push for size, push in zip(sizes, pushes, strict=True))
-        change[hand] = total / (sum(sizes) + 1e-4)
+        change[hand] = total / (sum(sizes) + 2e-3)
     gaps = np.stack([left - right for left in points["left"] for right in points["right"]])
     distances = np.linalg.norm(gaps, axis=2)
-    weights = np.exp(-(distances - distances.min(axis=0)) / 0.015)
-    weights /= weights.sum(axis=0)
-    distance = np.sum(weights * distances, axis=0)
-    # Apart sideways where the hands meet point to point, else along what lies between them.
-    away = np.einsum("pt,pti->ti", weights, gaps) + rotate(facing, np.array([0.02, 0.0, 0.0]))
-    away /= np.linalg.norm(away, axis=1, keepdims=True)
-    push = 0.5 * softplus(_HANDS_APART - distance, 0.012)[:, None] * away
+    nearest = distances.min(axis=0)
+    nearness = np.exp((nearest - distances) / _NEARNESS)
+    # The smooth minimum is never more than the least distance.
+    distance = nearest - _NEARNESS * np.log(np.sum(nearness, axis=0))
+    weights = nearness / np.sum(nearness, axis=0)
+    # Along what lies between them; where they cross, one hand passes over the other. No direction turns at once.
+    away = np.einsum("pt,pti->ti", weights, gaps) + rotate(facing, np.array([0.01, 0.025 * over, 0.06 * over]))
+    away /= np.sqrt(np.sum(away**2, axis=1, keepdims=True) + 0.03**2)
+    push = 0.6 * softplus(_HANDS_APART - distance, 0.042)[:, None] * away
     return {"left": change["left"] + push, "right": change["right"] - push}
 
 
@@ -75,11 +80,14 @@ def torso_distance(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Rota
     return offset / np.array([TORSO_HALF_AXES[0], 1.0, TORSO_HALF_AXES[1]]), middle
 
 
-def outside_torso(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Rotations) -> Vectors:
-    """Push points out of the torso's elliptic capsule, smoothly and straight away from its middle line."""
+def outside_torso(points: Vectors, pelvis: Vectors, neck: Vectors, facing: Rotations, width: float = 0.06) -> Vectors:
+    """Push points out of the torso's elliptic capsule, straight away from its middle line.
+
+    The push sets in smoothly over ``width``, in half axes of the torso.
+    """
     scaled, _ = torso_distance(points, pelvis, neck, facing)
     depth = np.linalg.norm(scaled, axis=1)
-    pushed = 1.0 + softplus(depth - 1.0, 0.06)
+    pushed = 1.0 + softplus(depth - 1.0, width)
     change = scaled * (pushed / np.maximum(depth, 1e-3) - 1.0)[:, None]
     change *= np.array([TORSO_HALF_AXES[0], 0.0, TORSO_HALF_AXES[1]])
     return points + rotate(facing, change)

@@ -92,37 +92,37 @@ class EmotionStyle:
 SPEAKER_STYLES: dict[str, GestureStyle] = {
     # Lively and light: two-handed, high, quick beats and frames.
     "ada": GestureStyle(
-        threshold=0.42, spacing=0.42, height=0.05, spread=0.02, radius=0.45, speed=1.12, two_handed=0.70,
+        threshold=0.42, spacing=0.42, height=0.05, spread=0.02, radius=0.46, speed=1.12, two_handed=0.70,
         right_handed=0.75, symmetry=0.92, hold=0.25, nod=5.0, gaze=9.0, lean=1.0, elbow_out=0.55, sway=1.0,
         rest_poses=(0.2, 0.6, 0.2), families=(3.0, 3.0, 1.0, 1.0, 1.0, 3.0), places=(0.45, 0.10, 0.35, 0.10),
     ),
     # Heavy and calm: low, slow, one right hand, long holds.
     "bruno": GestureStyle(
-        threshold=0.54, spacing=0.60, height=-0.03, spread=0.03, radius=0.42, speed=0.85, two_handed=0.35,
+        threshold=0.54, spacing=0.60, height=-0.03, spread=0.03, radius=0.48, speed=0.85, two_handed=0.35,
         right_handed=0.92, symmetry=0.75, hold=0.60, nod=3.0, gaze=5.0, lean=-1.0, elbow_out=0.70, sway=0.7,
         rest_poses=(0.7, 0.1, 0.2), families=(4.0, 3.0, 1.0, 2.0, 2.0, 1.0), places=(0.40, 0.45, 0.05, 0.10),
     ),
     # Expansive: wide sweeps and offers, large and fast, left hand as often as right.
     "chiara": GestureStyle(
-        threshold=0.33, spacing=0.45, height=0.02, spread=0.07, radius=0.5, speed=1.10, two_handed=0.60,
+        threshold=0.33, spacing=0.45, height=0.02, spread=0.07, radius=0.52, speed=1.10, two_handed=0.60,
         right_handed=0.55, symmetry=0.85, hold=0.20, nod=4.5, gaze=14.0, lean=3.0, elbow_out=0.65, sway=1.5,
         rest_poses=(0.4, 0.4, 0.2), families=(1.0, 4.0, 4.0, 1.0, 1.0, 2.0), places=(0.25, 0.10, 0.20, 0.45),
     ),
     # The lecturer: precise points and lists close to the body, strong nods.
     "david": GestureStyle(
-        threshold=0.5, spacing=0.50, height=0.03, spread=-0.02, radius=0.39, speed=1.0, two_handed=0.40,
+        threshold=0.5, spacing=0.50, height=0.03, spread=-0.02, radius=0.44, speed=1.0, two_handed=0.40,
         right_handed=0.85, symmetry=0.80, hold=0.50, nod=6.0, gaze=7.0, lean=2.0, elbow_out=0.50, sway=0.8,
         rest_poses=(0.2, 0.2, 0.6), families=(2.0, 1.0, 0.5, 4.0, 4.0, 1.0), places=(0.65, 0.10, 0.20, 0.05),
     ),
     # Reserved: few small gestures low before the belly, clasped hands.
     "elif": GestureStyle(
-        threshold=0.6, spacing=0.70, height=-0.02, spread=-0.03, radius=0.32, speed=0.92, two_handed=0.55,
+        threshold=0.6, spacing=0.70, height=-0.02, spread=-0.03, radius=0.37, speed=0.92, two_handed=0.55,
         right_handed=0.70, symmetry=0.90, hold=0.35, nod=4.0, gaze=6.0, lean=0.0, elbow_out=0.45, sway=0.6,
         rest_poses=(0.1, 0.45, 0.45), families=(4.0, 4.0, 0.5, 0.5, 1.0, 2.0), places=(0.55, 0.40, 0.02, 0.03),
     ),
     # Left-handed and restless: many quick beats, little holding, much head movement.
     "felix": GestureStyle(
-        threshold=0.25, spacing=0.38, height=0.0, spread=0.0, radius=0.41, speed=1.25, two_handed=0.45,
+        threshold=0.25, spacing=0.38, height=0.0, spread=0.0, radius=0.39, speed=1.2, two_handed=0.45,
         right_handed=0.15, symmetry=0.70, hold=0.08, nod=5.0, gaze=11.0, lean=4.0, elbow_out=0.55, sway=1.3,
         rest_poses=(0.5, 0.3, 0.2), families=(6.0, 2.0, 2.0, 2.0, 1.0, 1.0), places=(0.50, 0.20, 0.20, 0.10),
     ),
@@ -181,13 +181,13 @@ def gesture_style(speaker: str, emotion: str) -> GestureStyle:
         spacing=max(style.spacing / change.speed**0.5, 0.35),
         height=style.height + change.height,
         spread=style.spread + change.spread,
-        radius=style.radius * change.extent,
-        speed=style.speed * change.speed,
+        radius=min(style.radius * change.extent, 0.58),
+        speed=min(style.speed * change.speed, 1.42),
         hold=min(max(style.hold + change.hold, 0.05), 0.95),
         nod=style.nod * change.nod,
         gaze=style.gaze * change.gaze,
         lean=style.lean + change.lean,
-        sway=style.sway * change.sway,
+        sway=min(style.sway * change.sway, 1.7),
         head_pitch=style.head_pitch + change.head_pitch,
         tension=style.tension + change.tension,
     )
