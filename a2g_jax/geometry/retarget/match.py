@@ -1,0 +1,239 @@
+"""Which joint of one rig moves which joint of another."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.body import path_up
+from a2g_jax.geometry.joint_names import parse_name
+from a2g_jax.geometry.retarget.poses import angle_between, joint_places
+from a2g_jax.geometry.retarget.rest import ankle_height
+from a2g_jax.geometry.retarget.rig import Rig
+
+#: Bones that are rigid: what lies between the two parts is a twist bone, which turns but does not bend.
+_RIGID = {"Shoulder": "Elbow", "Elbow": "Wrist", "Hip": "Knee", "Knee": "Ankle"}
+_NEXT = {**_RIGID, "Collar": "Shoulder", "Ankle": "Foot", "Wrist": "Middle1"}
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One joint of the target that takes its pose from one of the source."""
+
+    target: int
+    source: int
+    role: str
+    how: str
+    """``"name"``, ``"shape"`` (topology), ``"order"`` (spines and necks are counted) or ``"same name"``."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A joint of the target between two matched ones that takes a part of the way from one's pose to the other's."""
+
+    target: int
+    above: int
+    below: int
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """The joints of two rigs set against each other; print :meth:`table` to see it."""
+
+    source: Rig
+    target: Rig
+    pairs: tuple[Pair, ...]
+    shares: tuple[Share, ...]
+    scale: float
+    """Target over source: leg length, or length of the arms where one has no legs."""
+    lift: float
+    """Metres that the target's hips are raised after scaling, so that its soles are where the source's are."""
+
+    def table(self) -> str:
+        """One line a joint of the target: source joints, how found, angle of bones at rest, ratio of their lengths."""
+        rows = [("source", "target", "part", "found by", "rest angle", "length")]
+        matched_sources = {pair.source for pair in self.pairs}
+        matched = {pair.target for pair in self.pairs}
+        for pair in sorted(self.pairs, key=lambda pair: pair.target):
+            composed = _composed(self.source.skeleton.parents, pair.source, matched_sources)
+            names = "+".join(self.source.skeleton.names[joint] for joint in composed)
+            angle, ratio = self._bone(pair)
+            rows.append((names, self.target.skeleton.names[pair.target], pair.role, pair.how, angle, ratio))
+        shared = {share.target: share for share in self.shares}
+        for joint, name in enumerate(self.target.skeleton.names):
+            if joint in shared:
+                rows.append(("-", name, "", f"share {shared[joint].weight:.2f}", "", ""))
+            elif joint not in matched:
+                rows.append(("-", name, "", "at rest", "", ""))
+        widths = [max(len(row[column]) for row in rows) for column in range(6)]
+        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        for what, rig in (("source", self.source), ("target", self.target)):
+            lines.append(f"{what}: {'parts by shape; ' if rig.by_shape else ''}{'; '.join(rig.notes)}")
+        lines.append(f"lengths times {self.scale:.3f}, hips raised by {100 * self.lift:.1f} cm")
+        return "\n".join(lines)
+
+    def bones(self) -> list[tuple[str, tuple[int, int], tuple[int, int]]]:
+        """Bones that both rigs have: the part, then (joint, joint below) in the source and in the target."""
+        by_role = {pair.role: pair for pair in self.pairs if pair.role}
+        found = []
+        for role, pair in by_role.items():
+            side, _, part = role.partition("_")
+            below = _NEXT.get(part, f"{part[:-1]}{int(part[-1]) + 1}" if part[-1:].isdigit() else None)
+            role_below = f"{side}_{below}" if part else {"Neck": "Head"}.get(role)
+            if role_below in by_role:
+                ends = by_role[role_below]
+                start = self.source.roles.get(role, pair.source), self.target.roles.get(role, pair.target)
+                found.append((role, (start[0], ends.source), (start[1], ends.target)))
+        return found
+
+    def _bone(self, pair: Pair) -> tuple[str, str]:
+        for role, (s0, s1), (t0, t1) in self.bones():
+            if role == pair.role:
+                first = _body_places(self.source)
+                second = _body_places(self.target)
+                source, target = first[s1] - first[s0], second[t1] - second[t0]
+                if np.linalg.norm(source) < 1e-6 or np.linalg.norm(target) < 1e-6:
+                    return "", ""
+                ratio = np.linalg.norm(target) / np.linalg.norm(source)
+                return f"{angle_between(source, target):.1f}", f"{ratio:.2f}"
+        return "", ""
+
+
+def match_rigs(source: Rig, target: Rig) -> Match:
+    """Match the joints of two rigs.
+
+    Limbs, head, pelvis and fingers match by their part. Spines and necks are counted: first to first, last to last,
+    the others by their place between. A twist bone within a limb matches one in the same place, otherwise its rotation
+    goes with the bone it belongs to. What is left matches by equal names below matched joints. Joints of the target
+    that remain take a share (spines, necks) or stay at rest below their parents (twist bones, fingers, leaf ends).
+
+    Raises:
+        InputError: the rigs have no arms in common.
+    """
+    pairs: dict[int, Pair] = {}
+    used: set[int] = set()
+
+    def add(target_joint: int, source_joint: int, role: str, how: str) -> None:
+        if target_joint not in pairs and source_joint not in used:
+            pairs[target_joint] = Pair(target_joint, source_joint, role, how)
+            used.add(source_joint)
+
+    found = "shape" if source.by_shape or target.by_shape else "name"
+    for role in target.roles:
+        if role not in source.roles or role in ("Chest", "Neck"):
+            continue
+        ours, theirs = _segment(target, role), _segment(source, role)
+        if len(ours) == len(theirs):
+            for at, (ours_joint, theirs_joint) in enumerate(zip(ours, theirs, strict=True)):
+                add(ours_joint, theirs_joint, role if at == len(ours) - 1 else f"{role}, part {at + 1}", found)
+        else:
+            # The last twist bone has the whole rotation of the segment.
+            add(ours[0], theirs[-1], role, found)
+    shares = []
+    for to, of, label, end in ((target.spine, source.spine, "Spine", -1), (target.neck, source.neck, "Neck", 0)):
+        for at, (first, second) in enumerate(_counted(len(to), len(of), end)):
+            add(to[first], of[second], label if label == "Neck" and at == 0 else f"{label}, {at + 1}", "order")
+    _same_names(source, target, pairs, add)
+    if not any(pair.role.endswith("_Elbow") for pair in pairs.values()):
+        raise InputError("The two rigs have no arm in common; give the joints by hand.")
+    lower = ([target.roles["Pelvis"]] if "Pelvis" in target.roles else []) + list(target.spine)
+    upper = list(target.neck) + ([target.roles["Head"]] if "Head" in target.roles else [])
+    for chain in (lower, upper):
+        shares += _shares(chain, set(pairs))
+    scale, lift = _scale(source, target)
+    return Match(source, target, tuple(pairs.values()), tuple(shares), scale, lift)
+
+
+def _segment(rig: Rig, role: str) -> list[int]:
+    """The joint of a part and the twist bones between it and the next part."""
+    side, _, part = role.partition("_")
+    joint = rig.roles[role]
+    below = rig.roles.get(f"{side}_{_RIGID.get(part)}")
+    if below is None:
+        return [joint]
+    return [joint, *reversed(path_up(rig.skeleton.parents, below, joint) or [])]
+
+
+def _counted(ours: int, theirs: int, single: int) -> list[tuple[int, int]]:
+    """Pairs of places in two chains, ends to ends; a chain of one goes with place ``single`` of the other."""
+    few, many = min(ours, theirs), max(ours, theirs)
+    if few == 0:
+        return []
+    if few == 1:
+        places = [(0, many - 1 if single == -1 else 0)]
+    else:
+        places = [(at, math.floor(at * (many - 1) / (few - 1) + 0.5)) for at in range(few)]
+    return places if ours <= theirs else [(second, first) for first, second in places]
+
+
+def _same_names(source: Rig, target: Rig, pairs: dict[int, Pair], add) -> None:
+    names = [parse_name(name) for name in source.skeleton.names]
+    where = {(name.side, name.base): joint for joint, name in reversed(list(enumerate(names)))}
+    for joint, name in enumerate(target.skeleton.names):
+        parsed = parse_name(name)
+        other = where.get((parsed.side, parsed.base))
+        if joint in pairs or other is None:
+            continue
+        ours = _matched_above(target.skeleton.parents, joint, set(pairs))
+        theirs = _matched_above(source.skeleton.parents, other, {pair.source for pair in pairs.values()})
+        if ours is not None and theirs is not None and pairs[ours].source == theirs:
+            add(joint, other, "", "same name")
+
+
+def _matched_above(parents: tuple[int, ...], joint: int, matched: set[int]) -> int | None:
+    joint = parents[joint]
+    while joint >= 0 and joint not in matched:
+        joint = parents[joint]
+    return joint if joint >= 0 else None
+
+
+def _composed(parents: tuple[int, ...], joint: int, matched: set[int]) -> list[int]:
+    """The joint and the unmatched ones above it, whose rotations it carries, from above."""
+    joints = [joint]
+    while parents[joints[0]] >= 0 and parents[joints[0]] not in matched:
+        joints.insert(0, parents[joints[0]])
+    return joints
+
+
+def _shares(chain: list[int], matched: set[int]) -> list[Share]:
+    shares = []
+    known = [at for at, joint in enumerate(chain) if joint in matched]
+    for above, below in zip(known, known[1:], strict=False):
+        for at in range(above + 1, below):
+            weight = (at - above) / (below - above)
+            shares.append(Share(chain[at], chain[above], chain[below], weight))
+    return shares
+
+
+def _scale(source: Rig, target: Rig) -> tuple[float, float]:
+    rigs, parts = (source, target), ("Hip", "Knee", "Ankle")
+    legs = all(f"{side}_{part}" in rig.roles for rig in rigs for side in "LR" for part in parts)
+    parts = parts if legs else ("Shoulder", "Elbow", "Wrist")
+    lengths = []
+    for rig in rigs:
+        places = _body_places(rig)
+        joints = [[rig.roles[f"{side}_{part}"] for part in parts] for side in "LR"]
+        bones = [(a, b) for row in joints for a, b in zip(row, row[1:], strict=False)]
+        lengths.append(sum(np.linalg.norm(places[b] - places[a]) for a, b in bones))
+    if min(lengths) < 1e-9:
+        raise InputError("A rig has limbs of no length; its file has no offsets. Use a rig with bones.")
+    scale = float(lengths[1] / lengths[0])
+    if not legs:
+        return scale, 0.0
+    heights = [ankle_height(rig.skeleton, _body_places(rig), _body(rig).T @ rig.rest_world, rig.roles) for rig in rigs]
+    return scale, heights[1] - scale * heights[0]
+
+
+def _body(rig: Rig) -> Float[np.ndarray, "3 3"]:
+    """``R_rest_body``, which is the anatomical frame of any joint of the trunk at rest."""
+    chest = rig.roles["Chest"]
+    return rig.rest_world[chest] @ rig.align[chest]
+
+
+def _body_places(rig: Rig) -> Float[np.ndarray, "J 3"]:
+    """Positions in the reference pose, in the body frame."""
+    offsets = np.asarray(rig.skeleton.offsets, np.float64)
+    return joint_places(rig.rest_world, offsets, rig.skeleton.parents) @ _body(rig)

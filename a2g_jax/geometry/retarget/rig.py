@@ -1,0 +1,335 @@
+"""What retargeting knows about a rig: its joints' parts in the body, reference pose, axes and unit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.body import path_up
+from a2g_jax.geometry.joint_names import named_joints, parse_name
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_places, world_rotations
+from a2g_jax.geometry.retarget.rest import anatomy, body_frame, oddness, snapped, trunk_axis
+from a2g_jax.geometry.retarget.topology import joints_by_shape
+from a2g_jax.geometry.skeleton import Skeleton
+
+#: Parts without which there is nothing to retarget.
+_NEEDED = tuple(f"{side}_{part}" for side in "LR" for part in ("Shoulder", "Elbow", "Wrist"))
+_LIMBS = (("Shoulder", "Elbow", "Wrist", "Collar"), ("Hip", "Knee", "Ankle", "Foot"))
+#: A pose of this oddness or less (degrees) is a T-, A- or I-pose; a zero pose, meant to be one, may be a bit worse.
+_GOOD_POSE, _ZERO_POSE, _WORST_POSE = 15.0, 40.0, 75.0
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+#: Metres in a unit, and the factor that mends lengths read in metres or centimetres when the file meant it.
+_UNITS = (("metres", 1.0), ("inches", 2.54), ("millimetres", 0.1), ("feet", 0.3048), ("decimetres", 10.0))
+_ADULT = (1.2, 2.3)
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A skeleton understood as a person; see :mod:`a2g_jax.geometry.retarget.rest` for the frames."""
+
+    skeleton: Skeleton
+    roles: dict[str, int]
+    """Joint of each part: ``Pelvis``, ``L_Hip`` ... ``R_Wrist``, ``Neck``, ``Head``, ``Chest``, ``L_Index1`` ..."""
+    spine: tuple[int, ...]
+    """Joints above the pelvis up to the chest, which carries the collars."""
+    neck: tuple[int, ...]
+    """Joints between chest and head."""
+    by_shape: bool
+    """Whether the parts were found by topology and not by names."""
+    rest: Float[np.ndarray, "J 3 3"]
+    """Local rotations of the reference pose."""
+    align: Float[np.ndarray, "J 3 3"]
+    """``R_joint_anatomy`` of every joint."""
+    world: Float[np.ndarray, "3 3"]
+    """``R_world_body`` of a person who faces forward in the world of the rig's motions: columns left, up, forward."""
+    height: float
+    """From the lowest point to the highest of the reference pose, along the body, as read (metres if rightly read)."""
+    notes: tuple[str, ...]
+    """How the reference pose, the axes and the unit were found."""
+
+    @property
+    def up(self) -> str:
+        """The axis that points up, such as ``"+Y"``."""
+        return _axis_name(self.world[:, 1])
+
+    @property
+    def unit_factor(self) -> float:
+        """What lengths must be multiplied by to be metres: 1 unless the file was in an unusual unit."""
+        return _guess_unit(self.height)[1]
+
+    @property
+    def rest_world(self) -> Float[np.ndarray, "J 3 3"]:
+        """Orientations of the reference pose, ``R_rest_joint``."""
+        return world_rotations(self.rest, self.skeleton.parents)
+
+
+def find_rig(
+    source: Motion | Skeleton,
+    *,
+    name: str = "the rig",
+    rest: str | int = "auto",
+    up: str | None = None,
+    joints: Mapping[str, str] | None = None,
+) -> Rig:
+    """Find the body in a rig.
+
+    Parts are found by names; where these do not give both arms, by topology and bone lengths. The reference pose is
+    the zero pose of the file if that shows a standing person, or else the frame of the motion that does best.
+
+    Args:
+        source: a motion, or only its skeleton; the motion also tells which way is up and can lend a reference pose.
+        name: how errors call it, such as the file's name.
+        rest: ``"auto"``, ``"zero"`` for the zero pose, or the number of a frame.
+        up: the vertical axis of the rig's motions, such as ``"Z"`` or ``"-Y"``; None finds it.
+        joints: parts given by hand, such as ``{"L_Elbow": "joint17"}``; they come before what is found.
+
+    Raises:
+        InputError: no two arms are found, or no pose shows a standing person.
+    """
+    skeleton = source if isinstance(source, Skeleton) else source.skeleton
+    motion = None if isinstance(source, Skeleton) else source
+    roles, untold = _find_roles(skeleton, name, joints or {})
+    by_shape = untold is not None
+    local, notes = _reference_pose(skeleton, motion, roles, rest, name)
+    world = world_rotations(local, skeleton.parents)
+    places = joint_places(world, np.asarray(skeleton.offsets, np.float64), skeleton.parents)
+    if untold:
+        roles = _tell_sides(roles, untold, places, name)
+    body = body_frame(places, roles)
+    body = _upright(body, drawn="zero pose" in notes[0])
+    axes = _world_axes(motion, roles, body, up, name)
+    spine, neck = _trunk(skeleton, roles)
+    heights = places @ body[:, 1]
+    height = float(heights.max() - heights.min())
+    notes += (f"up is {_axis_name(axes[:, 1])}, forward {_axis_name(axes[:, 2])}",)
+    unit, factor = _guess_unit(height)
+    notes += (f"{height:.2f} tall: lengths are {'right in metres' if factor == 1 else f'{unit}, times {factor}'}",)
+    align = anatomy(skeleton, places, world, body, roles)
+    return Rig(skeleton, roles, spine, neck, by_shape, local, align, axes, height, notes)
+
+
+def _find_roles(
+    skeleton: Skeleton, name: str, given: Mapping[str, str]
+) -> tuple[dict[str, int], list[tuple[str, ...]] | None]:
+    """Joints by part, and the limbs (from topology) whose sides are still to be told apart; None: all by name."""
+    fixed = {}
+    for role, joint in given.items():
+        if joint not in skeleton.names:
+            raise InputError(f"{name}: has no joint {joint!r} for {role}; it has {', '.join(skeleton.names)}.")
+        fixed[role] = skeleton.index(joint)
+    taken = set(fixed.values())
+    roles = {role: joint for role, joint in named_joints(skeleton.names).items() if joint not in taken} | fixed
+    untold = None
+    if missing := [role for role in _NEEDED if role not in roles]:
+        shape = joints_by_shape(skeleton)
+        if shape is None:
+            raise InputError(
+                f"{name}: no {', no '.join(missing)} found, neither by names nor by the shape of the tree; name the "
+                f"joints in the usual way or give them by hand. It has {', '.join(skeleton.names[:30])}"
+                f"{' ...' if skeleton.joints > 30 else ''}."
+            )
+        roles, untold = _with_names(shape, roles)
+    _complete(skeleton, roles)
+    for side in "LR":
+        _check_chain(skeleton, roles, [f"{side}_Shoulder", f"{side}_Elbow", f"{side}_Wrist"], name)
+        legs = [role for part in ("Hip", "Knee", "Ankle", "Foot") if (role := f"{side}_{part}") in roles]
+        _check_chain(skeleton, roles, legs, name)
+    return roles, untold
+
+
+def _with_names(shape: dict[str, int], named: dict[str, int]) -> tuple[dict[str, int], list[tuple[str, ...]]]:
+    """Parts by topology, corrected by the names there are, and the limbs whose sides no name tells."""
+    untold: list[tuple[str, ...]] = []
+    for parts in _LIMBS:
+        votes = 0
+        for side, other in ("LR", "RL"):
+            for part in parts:
+                joint = named.get(f"{side}_{part}")
+                votes += (joint is not None) * (shape.get(f"{side}_{part}") == joint)
+                votes -= (joint is not None) * (shape.get(f"{other}_{part}") == joint)
+        if votes < 0:
+            shape = _swapped(shape, parts)
+        if votes == 0 and f"L_{parts[0]}" in shape:
+            untold.append(parts)
+    return shape | named, untold
+
+
+def _swapped(roles: dict[str, int], parts: tuple[str, ...]) -> dict[str, int]:
+    """Left and right of a limb exchanged."""
+    swap = {"L": "R", "R": "L"}
+    changed = {f"{swap[s]}_{part}": roles[f"{s}_{part}"] for s in "LR" for part in parts if f"{s}_{part}" in roles}
+    return {role: joint for role, joint in roles.items() if role[2:] not in parts} | changed
+
+
+def _complete(skeleton: Skeleton, roles: dict[str, int]) -> None:
+    """Parts that follow from others: the chest, the pelvis, collars without a usual name."""
+    parents = skeleton.parents
+    roles["Chest"] = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
+    if "L_Hip" in roles and "R_Hip" in roles:
+        fork = _common(parents, roles["L_Hip"], roles["R_Hip"])
+        low = _common(parents, fork, roles["Chest"])
+        pelvis = roles.get("Pelvis")
+        if pelvis is None or any(path_up(parents, roles[part], pelvis) is None for part in ("Chest", "L_Hip", "R_Hip")):
+            roles["Pelvis"] = low
+    elif "Pelvis" in roles and path_up(parents, roles["Chest"], roles["Pelvis"]) is None:
+        del roles["Pelvis"]
+    for side in "LR":
+        above = path_up(parents, roles[f"{side}_Shoulder"], roles["Chest"]) or []
+        if roles.get(f"{side}_Collar") not in above:
+            roles.pop(f"{side}_Collar", None)
+            if above:
+                roles[f"{side}_Collar"] = above[-1]
+    for role in ("Neck", "Head"):
+        if role in roles and path_up(parents, roles[role], roles["Chest"]) is None:
+            # A neck below the fork of the arms is the chest by another name.
+            del roles[role]
+
+
+def _check_chain(skeleton: Skeleton, roles: dict[str, int], chain: list[str], name: str) -> None:
+    for upper, lower in zip(chain, chain[1:], strict=False):
+        if path_up(skeleton.parents, roles[lower], roles[upper]) is None:
+            names = skeleton.names[roles[lower]], skeleton.names[roles[upper]]
+            raise InputError(
+                f"{name}: {lower} ({names[0]}) does not hang below {upper} ({names[1]}); give both by hand."
+            )
+
+
+def _trunk(skeleton: Skeleton, roles: dict[str, int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    parents, chest = skeleton.parents, roles["Chest"]
+    if "Pelvis" not in roles:
+        spine = [chest]
+        while parents[spine[-1]] >= 0:
+            spine.append(parents[spine[-1]])
+    elif roles["Pelvis"] == chest:
+        spine = []
+    else:
+        spine = [chest, *(path_up(parents, chest, roles["Pelvis"]) or [])]
+    neck = []
+    if "Head" in roles:
+        neck = path_up(parents, roles["Head"], chest) or []
+    elif "Neck" in roles:
+        neck = [roles["Neck"]]
+        for joint, parent in enumerate(parents):
+            if parent == neck[0] and parse_name(skeleton.names[joint]).base.startswith("neck"):
+                neck.insert(0, joint)
+    if neck and "Neck" in roles and roles["Neck"] in neck:
+        # What lies between the fork of the arms and the neck by name is spine.
+        cut = neck.index(roles["Neck"]) + 1
+        neck, spine = neck[:cut], [*neck[cut:], *spine]
+    elif neck:
+        roles["Neck"] = neck[-1]
+    return tuple(reversed(spine)), tuple(reversed(neck))
+
+
+def _reference_pose(
+    skeleton: Skeleton, motion: Motion | None, roles: dict[str, int], rest: str | int, name: str
+) -> tuple[Float[np.ndarray, "J 3 3"], tuple[str, ...]]:
+    zero = np.tile(np.eye(3), (skeleton.joints, 1, 1))
+    odd = float(oddness(_places(skeleton, zero), roles))
+    if isinstance(rest, int):
+        if motion is None or not 0 <= rest < motion.frames:
+            raise InputError(f"{name}: frame {rest} cannot be the reference pose; there is no such frame.")
+        return np.asarray(motion.rotations[rest], np.float64), (f"reference: frame {rest}",)
+    if rest not in ("auto", "zero"):
+        raise InputError(f"{name}: expected the reference pose as auto, zero or a frame's number; got {rest!r}.")
+    if rest == "zero" or odd <= _ZERO_POSE:
+        return zero, (f"reference: zero pose ({odd:.0f} degrees from upright with straight limbs)",)
+    if motion is None or motion.frames == 0:
+        raise InputError(
+            f"{name}: the zero pose of the skeleton is no standing person ({odd:.0f} degrees off); "
+            "give a motion on it that shows one, or say which frame does."
+        )
+    rows = np.unique(np.linspace(0, motion.frames - 1, 2000).astype(int))
+    rotations = np.asarray(motion.rotations)[rows].astype(np.float64)
+    scores = oddness(_places(skeleton, rotations), roles)
+    # The first frame is where a T-pose stands if there is one.
+    best = 0 if scores[0] <= _GOOD_POSE else int(np.argmin(scores))
+    if scores[best] > min(odd, _WORST_POSE):
+        raise InputError(
+            f"{name}: neither the zero pose nor a frame shows a person standing with straight limbs (best: frame "
+            f"{rows[best]}, {scores[best]:.0f} degrees off); add a T-pose as first frame or name a frame."
+        )
+    note = f"reference: frame {rows[best]} ({scores[best]:.0f} degrees from upright with straight limbs)"
+    return rotations[best], (note,)
+
+
+def _places(skeleton: Skeleton, rotations: Float[np.ndarray, "*t J 3 3"]) -> Float[np.ndarray, "*t J 3"]:
+    world = world_rotations(rotations, skeleton.parents)
+    return joint_places(world, np.asarray(skeleton.offsets, np.float64), skeleton.parents)
+
+
+def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "3 3"]:
+    """The body frame along the world's axes where it nearly is: who poses stands upright.
+
+    A drawn pose faces along an axis as well; a captured person may face anywhere.
+    """
+    axes = snapped(body, 15.0)
+    if axes is None or drawn:
+        return body if axes is None else axes
+    if snapped(body, 4.0) is not None:
+        return axes
+    frame = frame_of(axes[:, 1], body[:, 0])
+    return np.stack([frame[:, 1], frame[:, 0], np.cross(frame[:, 1], frame[:, 0])], axis=1)
+
+
+def _tell_sides(
+    roles: dict[str, int], untold: list[tuple[str, ...]], places: Float[np.ndarray, "J 3"], name: str
+) -> dict[str, int]:
+    """Toes point forward; left is then up times forward."""
+    feet = [s for s in "LR" if f"{s}_Foot" in roles and f"{s}_Ankle" in roles]
+    if not feet:
+        raise InputError(f"{name}: names tell nothing and there are no toes to tell left from right; give the joints.")
+    forward = sum((places[roles[f"{s}_Foot"]] - places[roles[f"{s}_Ankle"]] for s in feet), np.zeros(3))
+    left = np.cross(trunk_axis(places, roles), forward)
+    for parts in untold:
+        if left @ (places[roles[f"L_{parts[0]}"]] - places[roles[f"R_{parts[0]}"]]) < 0:
+            roles = _swapped(roles, parts)
+    return roles
+
+
+def _world_axes(
+    motion: Motion | None, roles: dict[str, int], body: Float[np.ndarray, "3 3"], up: str | None, name: str
+) -> Float[np.ndarray, "3 3"]:
+    """Left, up and forward in the world of the motion; forward as drawn where the drawing stands upright in it."""
+    vertical = body[:, 1]
+    if motion is not None and motion.frames and up is None:
+        rows = np.unique(np.linspace(0, motion.frames - 1, 200).astype(int))
+        rotations = np.asarray(motion.rotations)[rows].astype(np.float64)
+        vertical = trunk_axis(_places(motion.skeleton, rotations), roles).mean(axis=0)
+    axis = int(np.argmax(np.abs(vertical)))
+    upward = np.eye(3)[axis] * (1.0 if vertical[axis] > 0 else -1.0)
+    if up is not None:
+        letter, sign = up[-1:].upper(), -1.0 if up.startswith("-") else 1.0
+        if letter not in _AXES or up[:-1] not in ("", "+", "-"):
+            raise InputError(f"{name}: expected the vertical axis as X, Y or Z with or without a sign; got {up!r}.")
+        upward = np.eye(3)[_AXES[letter]] * sign
+    forward = np.eye(3)[int(np.argmax(np.abs(body[:, 2])))] * np.sign(body[:, 2][np.argmax(np.abs(body[:, 2]))])
+    if abs(forward @ upward) > 0.5 or angle_between(body[:, 1], upward) > 30:
+        # By custom: forward is +Z where Y is up, -Y where Z is up.
+        forward = {0: np.eye(3)[2], 1: np.eye(3)[2], 2: -np.eye(3)[1]}[int(np.argmax(np.abs(upward)))]
+    return np.stack([np.cross(upward, forward), upward, forward], axis=1)
+
+
+def _guess_unit(height: float) -> tuple[str, float]:
+    # The reader takes lengths for metres or centimetres; what then is no adult was in another unit.
+    if _ADULT[0] <= height <= _ADULT[1] or height <= 0:
+        return _UNITS[0]
+    return min(_UNITS, key=lambda unit: abs(np.log(height * unit[1] / 1.7)))
+
+
+def _axis_name(vector: Float[np.ndarray, "3"]) -> str:
+    axis = int(np.argmax(np.abs(vector)))
+    return f"{'+' if vector[axis] > 0 else '-'}{'XYZ'[axis]}"
+
+
+def _common(parents: tuple[int, ...], first: int, second: int) -> int:
+    """The lowest joint that both hang from; one may hang from the other."""
+    while first != second:
+        if first > second:
+            first = parents[first]
+        else:
+            second = parents[second]
+    return first

@@ -1,0 +1,143 @@
+"""Skeletons to retarget to that keep a person's own proportions."""
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.retarget.poses import joint_places
+from a2g_jax.geometry.retarget.rig import Rig
+from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
+
+#: Where parts that a rig lacks are put: the collar between chest and shoulder, the ball of the foot from the ankle and
+#: the head from the neck as shares of the length of a leg and of the trunk.
+_COLLAR, _BALL, _HEAD = 0.3, (0.0, -0.08, 0.17), (0.0, 0.2, 0.03)
+_METACARPALS = ("Ring", "Pinky", "Index")
+_CARRIERS = {"Pinky": "Ring", "Thumb": "Index"}
+
+
+def body_skeleton(rig: Rig) -> Skeleton:
+    """The 22 body joints with the bones of a rig: Y-up, T-pose, metres (mended by the rig's unit).
+
+    Spines are placed as they are counted; a collar, a neck, a head or toes that the rig lacks come from proportions.
+
+    Raises:
+        InputError: the rig has no legs.
+    """
+    person = _Person(rig)
+    places, frames = {"Pelvis": person.hips()}, {"Pelvis": person.body}
+    count = len(rig.spine)
+    for number in range(3):
+        at = number * (count - 1) / 2
+        low, high = (rig.spine[int(f(at))] if count else rig.roles["Chest"] for f in (np.floor, np.ceil))
+        # Of more than three, one that exists; of two, the middle between.
+        whole = rig.spine[int(np.floor(at + 0.5))] if count >= 3 else None
+        point = (person.places[low] + person.places[high]) / 2 if whole is None else person.places[whole]
+        if count <= 1:
+            chest = person.places[rig.roles["Chest"]]
+            point = places["Pelvis"] + (chest - places["Pelvis"]) * (number + 1) / 3
+        places[f"Spine{number + 1}"], frames[f"Spine{number + 1}"] = point, person.body
+    shoulders = (person.places[rig.roles["L_Shoulder"]] + person.places[rig.roles["R_Shoulder"]]) / 2
+    trunk = float(np.linalg.norm(shoulders - places["Pelvis"]))
+    for role in BODY_JOINTS:
+        if role not in places and role in rig.roles:
+            places[role], frames[role] = person.places[rig.roles[role]], person.frames[rig.roles[role]]
+    places.setdefault("Neck", shoulders)
+    places.setdefault("Head", places["Neck"] + trunk * person.body @ np.array(_HEAD))
+    for side in "LR":
+        shoulder, ankle = places[f"{side}_Shoulder"], places[f"{side}_Ankle"]
+        places.setdefault(f"{side}_Collar", places["Spine3"] + _COLLAR * (shoulder - places["Spine3"]))
+        leg = float(np.linalg.norm(places[f"{side}_Hip"] - ankle))
+        places.setdefault(f"{side}_Foot", ankle + leg * frames[f"{side}_Ankle"] @ np.array(_BALL))
+    offsets = np.zeros((len(BODY_JOINTS), 3))
+    for joint, (role, parent) in enumerate(zip(BODY_JOINTS, BODY_PARENTS, strict=True)):
+        if parent >= 0:
+            above = BODY_JOINTS[parent]
+            offsets[joint] = frames.get(above, person.body).T @ (places[role] - places[above])
+    ends = []
+    for role in ("L_Foot", "R_Foot", "Head", "L_Wrist", "R_Wrist"):
+        if role in rig.roles and (tip := person.tip(rig.roles[role])) is not None:
+            ends.append((BODY_JOINTS.index(role), tip))
+    factor = rig.unit_factor
+    return Skeleton((offsets * factor).astype(np.float32), BODY_JOINTS, BODY_PARENTS, _scaled(ends, factor))
+
+
+def upper_body_skeleton(rig: Rig) -> Skeleton:
+    """BEAT's 47 upper-body joints with the bones of a rig: names and order of BEAT's files, Y-up, T-pose, metres.
+
+    ``Spine``, the root, is the rig's chest. Palm joints that the rig lacks lie at the wrist and never turn.
+
+    Raises:
+        InputError: the rig has no fingers, or an arm without a collar.
+    """
+    person = _Person(rig)
+    rows = [("Spine", "", "Chest"), ("Neck", "Spine", "Neck"), ("Neck1", "Neck", "Head")]
+    for side, word in (("R", "Right"), ("L", "Left")):
+        above = "Spine"
+        for name, part in (("Shoulder", "Collar"), ("Arm", "Shoulder"), ("ForeArm", "Elbow"), ("Hand", "Wrist")):
+            rows.append((word + name, above, f"{side}_{part}"))
+            above = word + name
+        for finger in ("Middle", "Ring", "Pinky", "Index", "Thumb"):
+            above = f"{word}Hand{_CARRIERS.get(finger, '')}"
+            if finger in _METACARPALS:
+                rows.append((f"{word}Hand{finger}", above, f"{side}_{finger}0"))
+                above = f"{word}Hand{finger}"
+            for number in (1, 2, 3):
+                rows.append((f"{word}Hand{finger}{number}", above, f"{side}_{finger}{number}"))
+                above = rows[-1][0]
+    missing = [part for _, _, part in rows if part not in rig.roles and not part.endswith("0")]
+    if missing:
+        raise InputError(f"The rig lacks joints of BEAT's 47: {', '.join(missing)}. Use the 22 body joints instead.")
+    joints = [rig.roles.get(part, rig.roles[f"{part[:1]}_Wrist"] if part.endswith("0") else -1) for _, _, part in rows]
+    names = tuple(name for name, _, _ in rows)
+    parents = tuple(names.index(above) if above else -1 for _, above, _ in rows)
+    offsets = np.zeros((len(rows), 3))
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            bone = person.places[joints[joint]] - person.places[joints[parent]]
+            offsets[joint] = person.frames[joints[parent]].T @ bone
+    ends = [(names.index("Neck1"), tip)] if (tip := person.tip(rig.roles["Head"])) is not None else []
+    for name, _, part in rows:
+        if part[-1:] == "3" and (tip := person.tip(rig.roles[part])) is not None:
+            ends.append((names.index(name), tip))
+    factor = rig.unit_factor
+    return Skeleton((offsets * factor).astype(np.float32), names, parents, _scaled(sorted(ends), factor))
+
+
+class _Person:
+    """A rig in its reference pose: positions and anatomical frames."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        world, parents = rig.rest_world, rig.skeleton.parents
+        self.places = joint_places(world, np.asarray(rig.skeleton.offsets, np.float64), parents)
+        self.world = world
+        self.frames: Float[np.ndarray, "J 3 3"] = world @ rig.align
+        self.body = self.frames[rig.roles["Chest"]]
+
+    def hips(self) -> Float[np.ndarray, "3"]:
+        """The pelvis; the middle of the hips where the rig has none between them and the spine."""
+        roles = self.rig.roles
+        missing = [f"{s}_{p}" for s in "LR" for p in ("Hip", "Knee", "Ankle") if f"{s}_{p}" not in roles]
+        if missing:
+            raise InputError(f"The rig lacks {', '.join(missing)}: no full body can be made of it.")
+        if roles.get("Pelvis", roles["Chest"]) != roles["Chest"]:
+            return self.places[roles["Pelvis"]]
+        return (self.places[roles["L_Hip"]] + self.places[roles["R_Hip"]]) / 2
+
+    def tip(self, joint: int) -> tuple[float, float, float] | None:
+        """The farthest point below a joint, in its anatomical frame."""
+        skeleton, below = self.rig.skeleton, {joint}
+        points = []
+        for other, parent in enumerate(skeleton.parents):
+            if parent in below:
+                below.add(other)
+                points.append(self.places[other])
+        points += [self.places[j] + self.world[j] @ np.asarray(end) for j, end in skeleton.ends if j in below]
+        bones = [self.frames[joint].T @ (point - self.places[joint]) for point in points]
+        far = max(bones, key=lambda bone: float(np.linalg.norm(bone)), default=np.zeros(3))
+        x, y, z = far.tolist()
+        return (x, y, z) if np.linalg.norm(far) > 1e-4 else None
+
+
+def _scaled(ends, factor: float) -> tuple[tuple[int, tuple[float, float, float]], ...]:
+    return tuple((joint, (x * factor, y * factor, z * factor)) for joint, (x, y, z) in ends)

@@ -1,0 +1,111 @@
+"""Moving one rig as another moves.
+
+With the frames of :mod:`~a2g_jax.geometry.retarget.rest`, a joint ``t`` of the target takes the pose of its partner
+``s`` in the source by
+
+    R_world_t(time) = W @ R_world_s(time) @ A_s @ A_t^T,
+
+where ``A`` is ``R_joint_anatomy`` of either and ``W = R_targetworld_body @ R_sourceworld_body^T`` turns the source's
+world into the target's (Z-up to Y-up, say). Bones point where they pointed and are rolled as they were rolled, because
+the whole orientation is taken over and not a direction alone. The way back is the inverse, so every matched joint
+returns exactly. Positions follow from the hips ``h``: ``h_target = scale * W @ h_source + lift * up``, with the scale
+of the legs, so that feet that stand still do so on the target too as far as the proportions of the legs agree.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.match import Match, match_rigs
+from a2g_jax.geometry.retarget.poses import between, joint_places, world_rotations
+from a2g_jax.geometry.retarget.rig import Rig, find_rig
+from a2g_jax.geometry.skeleton import Skeleton
+
+
+def retarget(motion: Motion, target: Rig | Skeleton | Match, *, source: Rig | None = None) -> Motion:
+    """The motion on another skeleton, in the world of that skeleton (its vertical axis, its forward).
+
+    Args:
+        motion: on any humanoid rig.
+        target: the rig to move. A skeleton is searched by :func:`~a2g_jax.geometry.retarget.find_rig`, whose options
+            a rig found before can carry; a match made before saves the search.
+        source: the rig of ``motion``, if found before.
+
+    Returns:
+        Float32 motion on the target's skeleton. Lengths scale by leg length; soles keep their height above the ground.
+
+    Raises:
+        InputError: a rig is not understood; the message names what was not found.
+    """
+    if isinstance(target, Match):
+        match = target
+    else:
+        source = find_rig(motion, name="the source") if source is None else source
+        target = find_rig(target, name="the target") if isinstance(target, Skeleton) else target
+        match = match_rigs(source, target)
+    if not motion.skeleton.same_tree(match.source.skeleton):
+        raise InputError("The motion is on another skeleton than the source rig that it was matched with.")
+    world = _target_world(match, np.asarray(motion.rotations, np.float32))
+    skeleton = match.target.skeleton
+    rotations = world.copy()
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            rotations[:, joint] = np.swapaxes(world[:, parent], -1, -2) @ world[:, joint]
+    return replace(motion, rotations=rotations, root=_root(match, motion, world), skeleton=skeleton)
+
+
+def _target_world(match: Match, rotations: Float[np.ndarray, "T J 3 3"]) -> Float[np.ndarray, "T K 3 3"]:
+    source, target = match.source, match.target
+    turn = target.world @ source.world.T
+    world = world_rotations(rotations, source.skeleton.parents)
+    result = np.zeros((len(rotations), target.skeleton.joints, 3, 3), np.float32)
+    ours = [pair.target for pair in match.pairs]
+    theirs = [pair.source for pair in match.pairs]
+    onto = (source.align[theirs] @ np.swapaxes(target.align[ours], -1, -2)).astype(np.float32)
+    result[:, ours] = turn.astype(np.float32) @ (world[:, theirs] @ onto)
+    shares = {share.target: share for share in match.shares}
+    matched, align, rest = set(ours), target.align.astype(np.float32), target.rest.astype(np.float32)
+    moved: set[int] = set()
+    for joint, parent in enumerate(target.skeleton.parents):
+        if joint in matched:
+            moved.add(joint)
+        elif joint in shares:
+            share = shares[joint]
+            above, below = (result[:, other] @ align[other] for other in (share.above, share.below))
+            result[:, joint] = between(above, below, share.weight) @ align[joint].T
+            moved.add(joint)
+        elif parent in moved:
+            result[:, joint] = result[:, parent] @ rest[joint]
+            moved.add(joint)
+        else:
+            # Nothing above moves: stand upright.
+            result[:, joint] = (target.world @ target.align[joint].T).astype(np.float32)
+    return result
+
+
+def _root(match: Match, motion: Motion, world: Float[np.ndarray, "T K 3 3"]) -> Float[np.ndarray, "T 3"]:
+    source, target = match.source, match.target
+    turn = target.world @ source.world.T
+    theirs = world_rotations(np.asarray(motion.rotations, np.float32), source.skeleton.parents)
+    anchors = _anchors(match)
+    from_root = joint_places(theirs, np.asarray(source.skeleton.offsets), source.skeleton.parents)
+    place = from_root[:, anchors[0]].mean(axis=1) + np.asarray(motion.root)
+    ours = joint_places(world, np.asarray(target.skeleton.offsets), target.skeleton.parents)
+    wanted = match.scale * (place @ turn.T) + match.lift * target.world[:, 1]
+    return (wanted - ours[:, anchors[1]].mean(axis=1)).astype(np.float32)
+
+
+def _anchors(match: Match) -> tuple[list[int], list[int]]:
+    """The joints whose middle is carried over: the hips, or the lowest matched joint of the trunk."""
+    source, target = match.source.roles, match.target.roles
+    if all(role in roles for roles in (source, target) for role in ("L_Hip", "R_Hip")):
+        return [source["L_Hip"], source["R_Hip"]], [target["L_Hip"], target["R_Hip"]]
+    pairs = {pair.target: pair.source for pair in match.pairs}
+    trunk = [target[role] for role in ("Pelvis",) if role in target] + [*match.target.spine, target["Chest"]]
+    lowest = next((joint for joint in trunk if joint in pairs), None)
+    if lowest is None:
+        return [source["L_Shoulder"], source["R_Shoulder"]], [target["L_Shoulder"], target["R_Shoulder"]]
+    return [pairs[lowest]], [lowest]
