@@ -48,20 +48,20 @@ def retarget(motion: Motion, target: Rig | Skeleton | Match, *, source: Rig | No
         match = match_rigs(source, target)
     if not motion.skeleton.same_tree(match.source.skeleton):
         raise InputError("The motion is on another skeleton than the source rig that it was matched with.")
-    world = _target_world(match, np.asarray(motion.rotations, np.float32))
+    theirs = world_rotations(np.asarray(motion.rotations, np.float32), match.source.skeleton.parents)
+    world = _target_world(match, theirs)
     skeleton = match.target.skeleton
     rotations = world.copy()
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
             rotations[:, joint] = np.swapaxes(world[:, parent], -1, -2) @ world[:, joint]
-    return replace(motion, rotations=rotations, root=_root(match, motion, world), skeleton=skeleton)
+    return replace(motion, rotations=rotations, root=_root(match, motion, theirs, world), skeleton=skeleton)
 
 
-def _target_world(match: Match, rotations: Float[np.ndarray, "T J 3 3"]) -> Float[np.ndarray, "T K 3 3"]:
+def _target_world(match: Match, world: Float[np.ndarray, "T J 3 3"]) -> Float[np.ndarray, "T K 3 3"]:
     source, target = match.source, match.target
     turn = target.world @ source.world.T
-    world = world_rotations(rotations, source.skeleton.parents)
-    result = np.zeros((len(rotations), target.skeleton.joints, 3, 3), np.float32)
+    result = np.zeros((len(world), target.skeleton.joints, 3, 3), np.float32)
     ours = [pair.target for pair in match.pairs]
     theirs = [pair.source for pair in match.pairs]
     onto = (source.align[theirs] @ np.swapaxes(target.align[ours], -1, -2)).astype(np.float32)
@@ -86,10 +86,11 @@ def _target_world(match: Match, rotations: Float[np.ndarray, "T J 3 3"]) -> Floa
     return result
 
 
-def _root(match: Match, motion: Motion, world: Float[np.ndarray, "T K 3 3"]) -> Float[np.ndarray, "T 3"]:
+def _root(
+    match: Match, motion: Motion, theirs: Float[np.ndarray, "T J 3 3"], world: Float[np.ndarray, "T K 3 3"]
+) -> Float[np.ndarray, "T 3"]:
     source, target = match.source, match.target
     turn = target.world @ source.world.T
-    theirs = world_rotations(np.asarray(motion.rotations, np.float32), source.skeleton.parents)
     anchors = _anchors(match)
     from_root = joint_places(theirs, np.asarray(source.skeleton.offsets), source.skeleton.parents)
     place = from_root[:, anchors[0]].mean(axis=1) + np.asarray(motion.root)
