@@ -39,6 +39,9 @@ def _number(kind: Callable[[str], Any], low: float | int, high: float | int, mea
 
 _positive = _number(float, 1e-6, 1e9, "a number above 0")
 _count = _number(int, 1, 1000, "a whole number from 1 to 1000")
+_rate = _number(int, 8000, 96000, "a whole number from 8000 to 96000")
+_fps = _number(float, 1, 1000, "a number from 1 to 1000")
+_seconds = _number(float, 2, 600, "a number from 2 to 600")
 _seed = _number(int, 0, 2**31 - 1, "a whole number from 0 to 2147483647")
 
 
@@ -70,13 +73,49 @@ def make_parser() -> argparse.ArgumentParser:
     demo.add_argument("--out", default="demo", metavar="DIR", help="folder to write to (default: demo)")
     sampling(demo)
 
-    prepare = command("prepare", "Make a corpus from recordings, or generate one.")
+    talk = command("talk", "A generated recording, several motions that are right for it, and the truth about them.")
+    talk.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
+    talk.add_argument("--seconds", type=_seconds, help="length (default: 20)")
+    talk.add_argument("--speaker", metavar="NAME", help="who talks (default: ada)")
+    talk.add_argument("--emotion", metavar="NAME", help="in which emotion (default: neutral)")
+    talk.add_argument("--seed", type=_seed, default=0, help="of all that is drawn (default: 0)")
+    talk.add_argument("--samples", type=_count, default=5, help="different right motions (default: 5)")
+    talk.add_argument("--fps", type=_fps, help="frames per second (default: 30; 15 with --view beat)")
+    talk.add_argument("--sample-rate", type=_rate, default=16000, metavar="HZ", help="of the audio (default: 16000)")
+    talk.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the 22 of the body")
+    talk.add_argument("--room", action="store_true", help="as heard by some microphone in some room")
+    talk.add_argument(
+        "--view", choices=("body", "beat"), default="body", help="beat: BEAT's 47 upper-body joints (default: body)"
+    )
+    talk.add_argument("--corpus", metavar="CORPUS", help="show a recording of this generated corpus instead")
+    talk.add_argument("--recording", metavar="NAME", help="which one of the corpus (default: the first)")
+    talk.add_argument(
+        "--formats",
+        default="wav,textgrid,json,bvh,npz,html",
+        help="any of wav, textgrid, json, bvh, npz, html, comma-separated (default: all)",
+    )
+
+    prepare = command(
+        "prepare", "Make a corpus from recordings, or generate one. Stopped before its end, the same command goes on."
+    )
     prepare.add_argument("reader", choices=("talker", "folder"), help="talker: generate; folder: WAV and BVH pairs")
     prepare.add_argument("source", nargs="?", help="the folder of recordings (for 'folder')")
     prepare.add_argument("--out", required=True, metavar="CORPUS", help="folder to make")
     prepare.add_argument("--minutes", type=_positive, help="minutes of talk to generate (default: 30)")
     prepare.add_argument("--seed", type=_seed, default=0, help="of the generated talk and of the splits (default: 0)")
     prepare.add_argument("--fps", type=_positive, default=30.0, help="frames per second (default: 30)")
+    prepare.add_argument("--speakers", metavar="NAMES", help="who talks, comma-separated (default: all)")
+    prepare.add_argument("--emotions", metavar="NAMES", help="in which emotions, comma-separated (default: all)")
+    prepare.add_argument("--jitter", type=_positive, metavar="DEGREES", help="capture noise on the generated motion")
+    prepare.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the 22 of the body")
+    prepare.add_argument(
+        "--on-demand",
+        action="store_true",
+        help="store the first 60 minutes; the rest is for training and generated in training, 30 minutes at a time",
+    )
+    prepare.add_argument(
+        "--workers", type=_count, help="processes; the corpus is the same for any (default: one a core)"
+    )
     prepare.add_argument(
         "--joints",
         choices=("body", "all"),

@@ -10,11 +10,15 @@ import jax
 
 from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.make import prepare_folder, prepare_talker
+from a2g_jax.data.on_demand import OnDemand
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation.deliver import check_formats, deliver
+from a2g_jax.generation.deliver_talk import check_talk_formats, deliver_talk
+from a2g_jax.generation.talk_request import TalkRequest, corpus_request
 from a2g_jax.io.audio import read_audio
 from a2g_jax.models import find_model
 from a2g_jax.progress import progress_bar
@@ -42,14 +46,23 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
         if options.source is not None:
             raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
         if options.joints is not None:
-            raise InputError("--joints is for recordings; a generated corpus has the 22 body joints.")
-        corpus = prepare_talker(options.out, options.minutes or 30.0, options.seed, options.fps)
+            raise InputError("--joints is for recordings; a generated corpus has 22 joints, or 52 with --fingers.")
+        corpus = prepare_talker(
+            options.out,
+            talker_options(options),
+            workers=options.workers,
+            on_demand=OnDemand() if options.on_demand else None,
+        )
     else:
         if options.source is None:
             raise InputError("name the folder: a2g prepare folder SOURCE --out CORPUS.")
-        if options.minutes is not None:
-            raise InputError("--minutes is for 'a2g prepare talker'; a folder is prepared whole.")
-        corpus = prepare_folder(options.source, options.out, options.seed, options.fps, options.joints or "body")
+        for name in ("minutes", "speakers", "emotions", "jitter", "fingers", "on_demand"):
+            if getattr(options, name) not in (None, False):
+                flag = name.replace("_", "-")
+                raise InputError(f"--{flag} is for 'a2g prepare talker'; a folder is prepared as it is.")
+        corpus = prepare_folder(
+            options.source, options.out, options.seed, options.fps, options.joints or "body", options.workers
+        )
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
     print(
         f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
@@ -57,6 +70,33 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
         + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
         + ")"
     )
+    if corpus.on_demand:
+        roles = [role for part in corpus.later["parts"] for role in part]
+        minutes = sum(role["seconds"] for role in roles) / 60
+        print(
+            f"{len(roles)} more training recordings, {minutes:.1f} minutes in {corpus.parts - 1} parts, are generated"
+            " in training (a2g train --part-steps: steps on each part)"
+        )
+
+
+def talker_options(options: argparse.Namespace) -> TalkerOptions:
+    """What the flags of ``a2g prepare talker`` ask for."""
+    return TalkerOptions(
+        minutes=options.minutes or 30.0,
+        seed=options.seed,
+        fps=options.fps,
+        speakers=_names("speakers", options.speakers),
+        emotions=_names("emotions", options.emotions),
+        jitter=options.jitter or 0.0,
+        fingers=options.fingers,
+    )
+
+
+def _names(flag: str, text: str | None) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
+    if text is not None and not names:
+        raise InputError(f"--{flag}: names nobody and nothing; leave it out for all.")
+    return names
 
 
 def parse_settings(pairs: list[str], model: Any, training: TrainConfig) -> tuple[Any, TrainConfig]:
@@ -116,6 +156,34 @@ def run_training(
     return train(RunConfig.of(name, preset, model, training, opened), opened, out, resume=resume)
 
 
+def run_talk(options: argparse.Namespace, _extra: list[str]) -> None:
+    """``a2g talk``."""
+    check_talk_formats(options.formats)
+    made = ("seconds", "speaker", "emotion", "fps", "room", "fingers")
+    asked = {name: getattr(options, name) for name in made if getattr(options, name) not in (None, False)}
+    request = TalkRequest(seed=options.seed, sample_rate=options.sample_rate, view=options.view, **asked)
+    if options.corpus is None:
+        if options.recording is not None:
+            raise InputError("--recording is of a corpus; name it with --corpus.")
+        recording = request.recording()
+    else:
+        for name in asked:
+            raise InputError(f"--{name} cannot be chosen for a recording of a corpus; leave it or --corpus out.")
+        recording, request = corpus_request(options.corpus, options.recording, request)
+    with progress_bar(options.samples, "gesturing", "motion") as bar:
+        written = deliver_talk(
+            recording,
+            options.out,
+            request=request,
+            samples=options.samples,
+            formats=options.formats,
+            report=lambda done: bar.update(done - bar.n),
+        )
+    print(f"{options.out}: {', '.join(f'{count} {kind}' for kind, count in written.items())}")
+    if "html" in written:
+        print(f"open {Path(options.out) / 'index.html'} in a browser")
+
+
 def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g generate``."""
     check_formats(options.formats)
@@ -139,7 +207,7 @@ def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:
         audio, title, words = speech.audio, "a generated speech", speech.words
     if options.train:
         if not (out / "corpus").exists():
-            prepare_talker(out / "corpus", DEMO_MINUTES, 0, 30.0)
+            prepare_talker(out / "corpus", TalkerOptions(minutes=DEMO_MINUTES))
         model = find_model("audio2gestures").presets["tiny"]
         training = TRAIN_PRESETS["tiny"]
         run = run_training("audio2gestures", "tiny", model, training, out / "corpus", out / "run", resume=True)

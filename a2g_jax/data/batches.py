@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.features.augment import augment_log_mel
 from a2g_jax.features.statistics import Statistics
@@ -30,13 +31,25 @@ def find_crops(corpus: Corpus, split: str, frames: int) -> Crops:
     Raises:
         InputError: no stretch is that long.
     """
-    segments = [segment for segment in corpus.segments(split) if segment.frames >= frames]
-    if not segments:
-        longest = max(segment.frames for segment in corpus.segments(split))
+    return crops_in(corpus.segments(split), frames, f"{corpus.path}: its longest {split} recording")
+
+
+def crops_in(segments: list[Segment], frames: int, longest: str) -> Crops:
+    """Starts of all clips of ``frames`` frames that lie within one of the stretches.
+
+    Args:
+        segments: stretches as rows of the arrays.
+        longest: what the longest stretch is, for the error.
+
+    Raises:
+        InputError: no stretch is that long.
+    """
+    most = max(segment.frames for segment in segments)
+    if most < frames:
         raise InputError(
-            f"{corpus.path}: its longest {split} recording has {longest} frames, a clip has {frames};"
-            " prepare longer recordings or lower --clip-frames."
+            f"{longest} has {most} frames, a clip has {frames}; prepare longer recordings or lower --clip-frames."
         )
+    segments = [segment for segment in segments if segment.frames >= frames]
     counts = np.cumsum([segment.frames - frames + 1 for segment in segments])
     return Crops(np.array([segment.start for segment in segments], np.int32), counts.astype(np.int32))
 

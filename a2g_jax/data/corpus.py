@@ -20,8 +20,11 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import read_json
 
 FORMAT = "a2g_jax corpus"
-VERSION = 1
+#: Of corpora whose recordings are all stored, and of those that leave most of them to be generated in training.
+VERSION, VERSION_ON_DEMAND = 1, 2
 MANIFEST = "manifest.json"
+#: In a corpus of the second kind: what to generate, part by part.
+PARTS = "parts.json"
 #: The arrays of a corpus, all recordings one after the other: log-mel (N, bands), 6D rotations (N, J, 6), root (N, 3).
 ARRAYS = ("audio.npy", "pose.npy", "root.npy")
 
@@ -54,6 +57,8 @@ class Corpus:
     """How it was made: reader, source, seed, options."""
     fingerprint: str
     """SHA-256 over the hashes of its arrays: equal data, equal fingerprint."""
+    on_demand: bool = False
+    """Whether most training recordings are not stored but generated in training."""
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> "Corpus":
@@ -68,9 +73,10 @@ class Corpus:
         manifest = read_json(path / MANIFEST)
         if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
             raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
-        if manifest.get("version") != VERSION:
+        if manifest.get("version") not in (VERSION, VERSION_ON_DEMAND):
             raise InputError(
-                f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION}; prepare it anew."
+                f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION} or"
+                f" {VERSION_ON_DEMAND}; prepare it anew."
             )
         try:
             corpus = cls(
@@ -82,6 +88,7 @@ class Corpus:
                 splits={name: [Segment(*row) for row in rows] for name, rows in manifest["splits"].items()},
                 recipe=manifest["recipe"],
                 fingerprint=manifest["fingerprint"],
+                on_demand=manifest["version"] == VERSION_ON_DEMAND,
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
@@ -101,6 +108,8 @@ class Corpus:
         for name, statistics in self.statistics.items():
             if not statistics.mean.shape == statistics.std.shape == shapes[name] or not np.all(statistics.std > 0):
                 raise InputError(f"{self.path / 'statistics.npz'}: is damaged ({name}); prepare the corpus anew.")
+        if self.on_demand:
+            self._check_parts()
         frames, joints = self.frames, self.skeleton.joints
         for name, shape in zip(ARRAYS, ((frames, self.mel.bands), (frames, joints, 6), (frames, 3)), strict=True):
             array = self._array(name)
@@ -109,15 +118,30 @@ class Corpus:
                     f"{self.path / name}: expected float32 {shape}; got {array.dtype} {array.shape}; prepare anew."
                 )
 
+    def _check_parts(self) -> None:
+        parts = self.later.get("parts") if isinstance(self.later, dict) else None
+        if not (parts and all(isinstance(roles, list) and roles for roles in parts) and self.later.get("stored")):
+            raise InputError(f"{self.path / PARTS}: is damaged; prepare the corpus anew.")
+
     def _array(self, name: str) -> np.ndarray:
         try:
             return np.load(self.path / name, mmap_mode="r", allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise InputError(f"{self.path / name}: cannot be read ({error}); prepare the corpus anew.") from None
 
+    @cached_property
+    def later(self) -> dict[str, Any]:
+        """What is generated in training: see :mod:`a2g_jax.data.on_demand`; nothing for an ordinary corpus."""
+        return read_json(self.path / PARTS) if self.on_demand else {}
+
+    @property
+    def parts(self) -> int:
+        """Parts that training takes in turns: the stored recordings, and those that are generated."""
+        return 1 + len(self.later.get("parts", ()))
+
     @property
     def frames(self) -> int:
-        """Number of frames of all recordings together."""
+        """Number of frames of all stored recordings together."""
         return sum(entry.frames for entry in self.recordings)
 
     @cached_property

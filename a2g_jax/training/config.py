@@ -35,11 +35,22 @@ class TrainConfig:
     """Latest checkpoints that are kept."""
     device_megabytes: float = 2_000.0
     """Corpora up to this size are held on the device; larger ones are read from disk batch by batch."""
+    part_steps: int = 500
+    """Steps on one part of a corpus prepared with --on-demand before the next one's turn; others are one part."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
 
     def __post_init__(self) -> None:
-        for name in ("steps", "batch_size", "checkpoint_every", "validate_every", "log_every", "keep_checkpoints"):
+        counts = (
+            "steps",
+            "batch_size",
+            "checkpoint_every",
+            "validate_every",
+            "log_every",
+            "keep_checkpoints",
+            "part_steps",
+        )
+        for name in counts:
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
         for name in ("warmup_steps", "clip_norm", "augmentation", "device_megabytes"):

@@ -13,8 +13,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from a2g_jax.data.batches import Dressing, draw_starts, find_crops, gather, gather_from_disk
+from a2g_jax.data.batches import Crops, Dressing, crops_in, draw_starts, find_crops, gather, gather_from_disk
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
@@ -53,23 +54,32 @@ def train(
     out = Path(out)
     settings = config.train_config
     # Whatever can be wrong is found before anything is written.
-    crops = find_crops(corpus, "train", config.model_config.clip_frames)
+    find_crops(corpus, "train", config.model_config.clip_frames)
     model = config.build()
     state = init_state(model, settings)
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
-    _check_folder(out, config, checkpoints, resume)
+    _check_folder(out, config, checkpoints, resume, corpus.on_demand)
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
     done = int(state.step)
-    step_function = _step_function(model, settings, corpus, crops, config)
     export = partial(_export, config, model, corpus, out)
     make_folder(out)
     sweep_unfinished(checkpoints.folder)
-    with MetricsLog(out, done, settings, progress) as log, _stop_requested() as stop:
+    with (
+        _stop_requested() as stop,
+        PartStream(corpus, settings.part_steps, settings.steps) as parts,
+        MetricsLog(out, done, settings, progress) as log,
+    ):
         write_json(out / RUN_FILE, run_to_json(config, done))
         run = None
+        steps = _Steps(model, settings, config)
         while done < settings.steps:
-            state, metrics = step_function(state)
+            part = parts.get(done, stop)
+            if part is None:
+                checkpoints.save(state)
+                export(state)
+                raise _interrupted(out, done, settings)
+            state, metrics = steps.of(part)(state)
             done += 1
             if done % settings.log_every == 0 or done == settings.steps:
                 values = {name: float(value) for name, value in jax.device_get(metrics).items()}
@@ -84,12 +94,16 @@ def train(
                 checkpoints.save(state)
                 run = export(state)
             if stop.is_set():
-                raise Interrupted(f"{out}: stopped after step {done} of {settings.steps}; go on with --resume.")
+                raise _interrupted(out, done, settings)
     # A run that was finished before has nothing to do but may lack its weights, if it was killed while writing them.
     return run if run is not None else export(state)
 
 
-def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool) -> None:
+def _interrupted(out: Path, done: int, settings: TrainConfig) -> Interrupted:
+    return Interrupted(f"{out}: stopped after step {done} of {settings.steps}; go on with --resume.")
+
+
+def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool, on_demand: bool) -> None:
     if out.is_file():
         raise InputError(f"{out}: is a file; name a folder for the run.")
     if not (out / RUN_FILE).exists():
@@ -105,7 +119,8 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
         raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
     now = json.loads(json.dumps(run_to_json(config, 0)))
     changed = [f"{key}: {values.get(key)}, now {now[key]}" for key in ("model", "fps") if values.get(key) != now[key]]
-    for part, free in (("model_config", frozenset()), ("train_config", _FREE), ("mel", frozenset())):
+    free_settings = _FREE if on_demand else _FREE | {"part_steps"}
+    for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
         before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
         changed += [
             f"{name}: {before.get(name)}, now {value}"
@@ -118,9 +133,37 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
         raise InputError(f"{out}: was trained with other settings ({'; '.join(changed)}); resume with the same ones.")
 
 
-def _step_function(
-    model: Model, settings: TrainConfig, corpus: Corpus, crops: Any, config: RunConfig
-) -> Callable[[TrainState], tuple[TrainState, Metrics]]:
+#: A whole step of training.
+_Step = Callable[[TrainState], tuple[TrainState, Metrics]]
+
+
+class _Steps:
+    """Steps on the parts of a corpus; parts alike in the lengths of their recordings share their compiled programs."""
+
+    def __init__(self, model: Model, settings: TrainConfig, config: RunConfig) -> None:
+        self._arguments = model, settings, config
+        self._programs: dict[tuple[bytes, ...], Callable[[Any], _Step]] = {}
+        self._last: tuple[Part, _Step] | None = None
+
+    def of(self, part: Part) -> _Step:
+        """The step on a part; kept until another part is asked for."""
+        if self._last is None or self._last[0] is not part:
+            model, settings, config = self._arguments
+            crops = crops_in(part.segments, model.clip_frames, "the longest recording of a part")
+            key = tuple(np.asarray(array).tobytes() for array in crops)
+            if key not in self._programs:
+                self._programs[key] = _programs(model, settings, crops, config)
+            self._last = None  # lets go of the part before, before the next one is put on the device
+            self._last = part, self._programs[key](part)
+        return self._last[1]
+
+
+def _step_function(model: Model, settings: TrainConfig, corpus: Corpus, crops: Crops, config: RunConfig) -> _Step:
+    """The step on an ordinary corpus."""
+    return _programs(model, settings, crops, config)(corpus)
+
+
+def _programs(model: Model, settings: TrainConfig, crops: Crops, config: RunConfig) -> Callable[[Corpus | Part], _Step]:
     """One whole step: choose clips, augment, compute, update. The same clips wherever the data lies."""
     frames = model.clip_frames
     dressing = Dressing(config.statistics["audio"], settings.augmentation)
@@ -132,25 +175,26 @@ def _step_function(
     def starts(state: TrainState):
         return draw_starts(step_keys(state.key, state.step)[0], crops, settings.batch_size)
 
-    megabytes = (corpus.audio.nbytes + corpus.pose.nbytes) / 1e6
-    if megabytes <= settings.device_megabytes:
-        audio, pose = jax.device_put(np.asarray(corpus.audio)), jax.device_put(np.asarray(corpus.pose))
-
-        @partial(jax.jit, donate_argnums=0)
-        def on_device(state: TrainState, audio, pose):
-            rows = starts(state)
-            return finish(state, gather(audio, rows, frames), gather(pose, rows, frames))
-
-        return lambda state: on_device(state, audio, pose)
+    @partial(jax.jit, donate_argnums=0)
+    def on_device(state: TrainState, audio, pose):
+        rows = starts(state)
+        return finish(state, gather(audio, rows, frames), gather(pose, rows, frames))
 
     choose = jax.jit(starts)
     compute = jax.jit(finish, donate_argnums=0)
 
-    def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
-        rows = np.asarray(choose(state))
-        return compute(state, gather_from_disk(corpus.audio, rows, frames), gather_from_disk(corpus.pose, rows, frames))
+    def on(data: Corpus | Part) -> _Step:
+        if (data.audio.nbytes + data.pose.nbytes) / 1e6 <= settings.device_megabytes:
+            audio, pose = jax.device_put(np.asarray(data.audio)), jax.device_put(np.asarray(data.pose))
+            return lambda state: on_device(state, audio, pose)
 
-    return from_disk
+        def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
+            rows = np.asarray(choose(state))
+            return compute(state, gather_from_disk(data.audio, rows, frames), gather_from_disk(data.pose, rows, frames))
+
+        return from_disk
+
+    return on
 
 
 def _check_finite(state: TrainState, step: int, values: dict[str, float], checkpoints: Checkpoints) -> None:

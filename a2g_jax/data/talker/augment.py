@@ -17,12 +17,12 @@ def _equaliser(
 
 def _room_response(sample_rate: int, rng: np.random.Generator) -> Float[np.ndarray, " N"]:
     """Direct sound at sample 0, then noise that decays exponentially (RT60 of 0.12 to 0.45 s)."""
-    decay = rng.uniform(0.12, 0.45)
+    decay, level = rng.uniform(0.12, 0.45), rng.uniform(-20.0, -6.0)
     time = np.arange(int(decay * sample_rate)) / sample_rate
     tail = rng.standard_normal(len(time)) * np.exp(-np.log(1000.0) * time / decay)
     tail[time < 0.003] = 0.0
     # Energy of the tail relative to the direct sound: near to far microphone.
-    tail *= 10.0 ** (rng.uniform(-20.0, -6.0) / 20.0) / np.sqrt(np.sum(tail**2))
+    tail *= 10.0 ** (level / 20.0) / np.sqrt(np.sum(tail**2))
     tail[0] = 1.0
     return tail
 
@@ -33,7 +33,9 @@ def augment(audio: Float[np.ndarray, " N"], sample_rate: int, rng: np.random.Gen
     Random equaliser (standard deviation 4 dB), small room (direct-to-reverberant ratio 6 to 20 dB), coloured noise at a
     signal-to-noise ratio of 15 to 40 dB, and gain of +-6 dB.
     """
-    response = _room_response(sample_rate, rng)
+    # The room's noise takes as many draws as there are samples: it has a stream of its own.
+    echoes, hiss = rng.spawn(2)
+    response = _room_response(sample_rate, echoes)
     size = fft.next_fast_len(len(audio) + len(response), real=True)
     frequency = fft.rfftfreq(size, 1.0 / sample_rate)
     shape = fft.rfft(response, size) * _equaliser(frequency, rng)
@@ -42,7 +44,7 @@ def augment(audio: Float[np.ndarray, " N"], sample_rate: int, rng: np.random.Gen
     power = float(np.mean(np.square(wet))) + 1e-12
     slope = rng.uniform(0.0, 1.0)  # white to brown-ish
     colour = (np.maximum(frequency, 60.0) / 60.0) ** -slope
-    noise = fft.irfft(fft.rfft(rng.standard_normal(size)) * colour, size)[: len(audio)]
+    noise = fft.irfft(fft.rfft(hiss.standard_normal(size)) * colour, size)[: len(audio)]
     ratio_db = rng.uniform(15.0, 40.0)
     noise *= np.sqrt(power / np.mean(np.square(noise)) * 10.0 ** (-ratio_db / 10.0))
     recorded = wet + noise

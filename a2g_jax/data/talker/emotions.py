@@ -1,15 +1,27 @@
 """What the eight emotions of BEAT do to a voice.
 
-The directions follow the reviews of vocal emotion: Murray & Arnott 1993 (table of voice effects of anger, happiness,
-sadness, fear and disgust relative to neutral: rate, F0 mean, F0 range, intensity, voice quality, articulation),
-Banse & Scherer 1996 (fourteen acted emotions: F0 and energy high in hot anger, panic fear and elation, low in sadness
-and contempt) and Juslin & Laukka 2003 (a meta-analysis: fast and loud, with strong high frequencies, for anger and
-happiness; fast for fear; slow, soft, low and narrow for sadness). Surprise is not among their well-studied categories:
-its high level and very wide range are our choice. The sizes are ours throughout: large enough to be learned from
-minutes of speech, small enough that speakers and emotions stay separate factors.
+Directions relative to neutral, and where they come from:
+
+- Anger, happiness, sadness, fear and disgust: the summary table of Murray & Arnott 1993 ("Toward the simulation of
+  emotion in synthetic speech"). Rate: anger slightly faster, happiness faster or slower, sadness slightly slower,
+  fear much faster, disgust very much slower. Mean F0: anger and fear very much higher, happiness much higher, sadness
+  slightly lower, disgust very much lower. F0 range: anger, happiness and fear much wider, sadness slightly narrower,
+  disgust slightly wider. Intensity: anger and happiness higher, fear normal, sadness and disgust lower. Quality: anger
+  breathy with chest tone, happiness breathy, sadness resonant, fear irregular voicing, disgust grumbled. Articulation:
+  anger tense, sadness slurred, fear precise.
+- Where sources differ we take a side. Fear's range: much wider there, but small F0 variability in the meta-analysis of
+  Juslin & Laukka 2003; ours is a little wider. Anger's voice: breathy there; ours is pressed, with strong high
+  frequencies, as in Juslin & Laukka 2003 and in hot anger of Banse & Scherer 1996. Sadness: weak high frequencies in
+  both; our breathiness is a choice (theirs is "resonant").
+- Contempt: low F0 and low energy, from the acted portrayals of Banse & Scherer 1996; its rate, range and pauses are
+  choices.
+- Surprise: not in those tables for lack of studies; its high level and wide range are choices.
+- Sizes, pauses, accent density and the articulation of happiness, surprise, contempt and disgust are choices
+  throughout: large enough to be learned from minutes of speech, small enough that speakers and emotions stay separate
+  factors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -53,3 +65,20 @@ VOICE_EMOTIONS: dict[str, VoiceEmotion] = {
     )
 }
 """The eight emotions by name, in the order of BEAT's labels."""
+
+
+def shown(emotion: VoiceEmotion, strength: float) -> VoiceEmotion:
+    """The emotion shown more (strength above 1) or less strongly: deviations from neutral scale with ``strength``."""
+    return replace(
+        emotion,
+        f0_shift_semitones=strength * emotion.f0_shift_semitones,
+        f0_range_factor=emotion.f0_range_factor**strength,
+        rate_factor=emotion.rate_factor**strength,
+        loudness_db=strength * emotion.loudness_db,
+        tilt_db_per_octave=strength * emotion.tilt_db_per_octave,
+        pause_factor=emotion.pause_factor**strength,
+        accent_density=emotion.accent_density**strength,
+        breathiness_db=strength * emotion.breathiness_db,
+        jitter_factor=emotion.jitter_factor**strength,
+        articulation=emotion.articulation**strength,
+    )

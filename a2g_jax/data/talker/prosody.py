@@ -23,11 +23,13 @@ from a2g_jax.data.talker.speakers import VoiceStyle
 from a2g_jax.data.talker.speech import SpeechPlan
 
 ALPHA, BETA, GAMMA = 3.0, 20.0, 0.9
-ACCENT_DB = (0.5, 8.0)
+ACCENT_DB = (0.0, 8.5)
 """Energy an accent adds, dB: ``ACCENT_DB[0] + ACCENT_DB[1] * accent`` for accents above zero."""
 
+_TURNS = {"fall": -0.55, "continuation": 0.22, "question": 0.75}  # of the range, over the last 0.35 s
 _NEPER_PER_SEMITONE = math.log(2.0) / 12.0
 _WANDER = 0.08  # of the range: what no command explains
+_SYLLABLE_DB, _PHRASE_DB = 1.3, 2.0  # standard deviations of what no accent explains
 _PHRASE_LEAD = 0.25  # seconds by which a phrase command precedes the phrase
 
 
@@ -52,19 +54,20 @@ def _between(times: Float[np.ndarray, " T"], start: float, end: float) -> slice:
 def _phrase_curve(
     plan: SpeechPlan, reach: float, times: Float[np.ndarray, " T"], rng: np.random.Generator
 ) -> Float[np.ndarray, " T"]:
-    """Phrase components of ln F0, with the final fall or rise of each phrase."""
+    """Phrase components of ln F0, reset at each phrase, most at a sentence's start; a fall or rise at its end."""
     curve = np.zeros(len(times))
+    goes_on = False
     for phrase in plan.phrases:
-        size = 0.75 * reach * math.exp(0.15 * rng.standard_normal())
+        size = (0.62 if goes_on else 0.85) * reach * math.exp(0.15 * rng.standard_normal())
+        goes_on = phrase.ending == "continuation"
         commands = [(phrase.start - _PHRASE_LEAD, size)]
-        if phrase.end - phrase.start > 2.2:
-            # A second, smaller command keeps long phrases from falling to the floor half way.
-            commands.append((phrase.start + 1.4, 0.5 * size))
+        # Further, smaller commands keep long phrases from falling to the floor half way.
+        commands += [(phrase.start + t, 0.45 * size) for t in np.arange(1.4, phrase.end - phrase.start - 0.8, 1.6)]
         for moment, height in commands:
             part = _between(times, moment, moment + 4.0)
             curve[part] += height * phrase_response(times[part] - moment)
-        # Final lowering; one phrase in five rises instead, as questions and continuations do.
-        turn = -0.30 * reach if rng.random() < 0.8 else 0.45 * reach
+        # Final lowering, or the rise of a question or a continuation.
+        turn = _TURNS[phrase.ending] * reach * math.exp(0.25 * rng.standard_normal())
         part = _between(times, phrase.end - 0.35, phrase.end)
         curve[part] += turn * ((times[part] - phrase.end + 0.35) / 0.35) ** 2
     return curve
@@ -135,13 +138,31 @@ def pitch_contour(
     return np.exp(log_f0)
 
 
-def energy_contour(plan: SpeechPlan, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
+def creak_contour(
+    plan: SpeechPlan, times: Float[np.ndarray, " T"], rng: np.random.Generator
+) -> Float[np.ndarray, " T"]:
+    """How creaky the voice is, 0 to 1: half of the falling phrases end in creak (irregular pulses at half the rate)."""
+    curve = np.zeros(len(times))
+    for phrase in plan.phrases:
+        length = rng.uniform(0.08, 0.22)
+        if phrase.ending == "fall" and rng.random() < 0.5:
+            part = _between(times, phrase.end - length - 0.05, phrase.end)
+            curve[part] = np.clip((times[part] - phrase.end + length + 0.05) / 0.05, 0.0, 1.0)
+    return curve
+
+
+def energy_contour(
+    plan: SpeechPlan, times: Float[np.ndarray, " T"], rng: np.random.Generator
+) -> Float[np.ndarray, " T"]:
     """Level in dB relative to an unaccented stressed vowel, at the given times; peaks at every syllable's peak."""
     peaks = [syllable.peak for syllable in plan.syllables]
-    level = np.interp(times, peaks, [0.0 if syllable.stress else -1.2 for syllable in plan.syllables])
+    chance = _SYLLABLE_DB * rng.standard_normal(len(peaks))
+    own = [dB + (0.0 if s.stress else -1.5) for s, dB in zip(plan.syllables, chance.tolist(), strict=True)]
+    level = np.interp(times, peaks, own)
     for phrase in plan.phrases:
         part = _between(times, phrase.start, phrase.end)
-        level[part] += 1.5 - 3.0 * (times[part] - phrase.start) / (phrase.end - phrase.start)
+        share = (times[part] - phrase.start) / (phrase.end - phrase.start)
+        level[part] += _PHRASE_DB * rng.standard_normal() + 1.5 - 3.0 * share
         part = _between(times, phrase.end - 0.2, phrase.end)
         level[part] -= 6.0 * ((times[part] - phrase.end + 0.2) / 0.2) ** 2
     for syllable in plan.syllables:
@@ -149,7 +170,7 @@ def energy_contour(plan: SpeechPlan, times: Float[np.ndarray, " T"]) -> Float[np
         # Every syllable is a hill of its own.
         half = max(peak - syllable.onset, syllable.end - peak)
         part = _between(times, syllable.onset, syllable.end)
-        level[part] -= 8.0 * np.minimum(((times[part] - peak) / half) ** 2, 1.0)
+        level[part] -= 10.0 * np.minimum(((times[part] - peak) / half) ** 2, 1.0)
         if syllable.accent > 0.0:
             rise, fall = 0.055, max(0.065, 0.4 * (syllable.end - peak))
             part = _between(times, peak - 4.0 * rise, peak + 4.0 * fall)

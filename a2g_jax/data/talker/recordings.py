@@ -1,5 +1,6 @@
 """Whole recordings of the generated corpus: a plan, its voice, and one of its many right motions."""
 
+import zlib
 from dataclasses import asdict
 from typing import Any
 
@@ -56,9 +57,11 @@ def talk(
     for kind, value, known in (("speaker", speaker, SPEAKERS), ("emotion", emotion, VOICE_EMOTIONS)):
         if value not in known:
             raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
-    plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH]))
+    # One seed makes different people say different things, in different moods too.
+    role = zlib.crc32(f"{speaker}/{emotion}".encode())
+    plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
     motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps, fingers)
-    audio = synthesise(plan, np.random.default_rng([seed, _VOICE]), sample_rate)
+    audio = synthesise(plan, np.random.default_rng([seed, _VOICE, role]), sample_rate)
     if room:
         audio = augment(audio, sample_rate, np.random.default_rng([seed, _ROOM]))
     return Recording(

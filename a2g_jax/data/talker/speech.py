@@ -6,6 +6,9 @@ and draw everything else (see :mod:`a2g_jax.data.talker.truth`) from their own k
 
 from dataclasses import dataclass
 
+ENDINGS = ("fall", "continuation", "question")
+"""How the melody of a phrase ends: a final fall, a small rise that says there is more to come, or a high rise."""
+
 
 @dataclass(frozen=True)
 class Syllable:
@@ -42,6 +45,8 @@ class Phrase:
 
     start: float
     end: float
+    ending: str = "fall"
+    """One of :data:`ENDINGS`; only a continuation goes on with the same sentence."""
 
 
 @dataclass(frozen=True)
@@ -57,3 +62,5 @@ class SpeechPlan:
     phrases: tuple[Phrase, ...]
     words: tuple[PlannedWord, ...]
     syllables: tuple[Syllable, ...]
+    strength: float = 1.0
+    """How strongly the emotion shows in the voice: multiplies its deviation from neutral."""

@@ -10,6 +10,9 @@ from jaxtyping import Complex, Float
 
 _UPPER_HZ = (3450.0, 4450.0, 5500.0, 6500.0, 7500.0)  # F4 to F8 of a 17.5 cm tract
 _HIGHER_POLES_DB = 6.0  # at 4 kHz
+_TOP_HZ = 8000.0  # between F8 and F9: no single pole is modelled above it
+_TOP_SLOPE_DB = -6.0  # dB/octave of the tract above it
+_RIPPLE_DB = 5.0
 _UPPER_WIDTH_HZ = (200.0, 260.0, 350.0, 450.0, 550.0)
 
 
@@ -25,12 +28,20 @@ def resonance(
 
 
 def upper_formants(frequency: Float[np.ndarray, " F"], tract_length: float) -> Complex[np.ndarray, " F"]:
-    """Response of the formants that do not move, F4 and up."""
+    """Response of the formants that do not move, F4 and up; above 8 kHz one ripple for each 1000 Hz of the tube."""
     centre = np.array(_UPPER_HZ, np.float32) / np.float32(tract_length)
     width = np.array(_UPPER_WIDTH_HZ, np.float32)
     # Stands for the poles above F8, whose skirts lift what lies below them (Fant's higher-pole correction).
     lift = 10.0 ** (_HIGHER_POLES_DB * (np.minimum(frequency, 8000.0) * tract_length / 4000.0) ** 2 / 20.0)
-    return lift / resonance(frequency, centre, width).prod(axis=0)
+    known = np.minimum(frequency, _TOP_HZ / tract_length)
+    response = lift / resonance(known.astype(np.float32), centre, width).prod(axis=0)
+    above = frequency > _TOP_HZ / tract_length
+    if above.any():
+        ratio = frequency[above] * np.float32(tract_length / _TOP_HZ)
+        # F1 to F3 go on falling by 36 dB/octave up there; the poles beyond F8 make up for it and add ripples.
+        ripple = 10.0 ** (_RIPPLE_DB / 20.0 * np.sin(np.pi * (ratio - 1.0) * _TOP_HZ / 1000.0) ** 2)
+        response[above] *= ratio ** (6.0 + _TOP_SLOPE_DB / (20.0 * np.log10(2.0))) * ripple
+    return response
 
 
 def tract_response(
@@ -78,6 +89,7 @@ def noise_spectrum(
 ) -> Float[np.ndarray, "P F"]:
     """Magnitude of frication noise: one hump that falls off slowly, with little below it."""
     offset = (frequency[None, :] - centre[:, None]) / width[:, None]
-    steepness = np.where(offset < 0.0, 1.3, 0.9).astype(np.float32)
+    steepness = np.where(offset < 0.0, 1.3, 0.75).astype(np.float32)
     low = frequency[None, :] / (frequency[None, :] + 0.15 * centre[:, None])
-    return low * ((1.0 + offset * offset) ** -steepness + 0.02)
+    high = 1.0 / (1.0 + (frequency[None, :] / np.float32(14000.0)) ** 4)
+    return low * high * ((1.0 + offset * offset) ** -steepness + 0.02)

@@ -14,9 +14,9 @@ from jaxtyping import Float
 from scipy import fft
 
 from a2g_jax.data.talker.articulation import SILENT, TRACK_RATE, Tracks, articulate
-from a2g_jax.data.talker.emotions import VOICE_EMOTIONS, VoiceEmotion
-from a2g_jax.data.talker.prosody import energy_contour, pitch_contour
-from a2g_jax.data.talker.speakers import SPEAKERS, VoiceStyle
+from a2g_jax.data.talker.emotions import VOICE_EMOTIONS, VoiceEmotion, shown
+from a2g_jax.data.talker.prosody import creak_contour, energy_contour, pitch_contour
+from a2g_jax.data.talker.speakers import SPEAKERS, VoiceStyle, session_voice
 from a2g_jax.data.talker.speech import SpeechPlan
 from a2g_jax.data.talker.tract import glottal_spectrum, noise_spectrum, tract_response, upper_formants
 from a2g_jax.errors import InputError
@@ -31,7 +31,9 @@ _LEAD_SECONDS = 0.008  # room for the anticausal part of the glottal pulse
 _CHUNK = 512  # pulses or frames at a time: their spectra stay in the processor's cache
 _AUDIBLE_DB = SILENT + 1.0
 _LEVEL_SECONDS = 0.04
-_BREATH_DBFS = -46.0
+_BREATH_DBFS = -43.0
+_REFERENCE_HZ = 8000.0  # levels count what lies below, so that they do not depend on the sample rate
+_CREAK_F0, _CREAK_JITTER, _CREAK_DB = 0.55, 0.07, 2.0
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,11 @@ def _amplitude(track_db: np.ndarray, level_db: np.ndarray | float = 0.0) -> np.n
     return np.where(track_db > _AUDIBLE_DB, 10.0 ** ((track_db + level_db) / 20.0), 0.0).astype(np.float32)
 
 
-def _band_power(spectrum: np.ndarray, n_fft: int) -> Float[np.ndarray, " P"]:
-    """Sum of squares of the signals with these half-spectra (Parseval)."""
+def _band_power(spectrum: np.ndarray, grid: _Grid) -> Float[np.ndarray, " P"]:
+    """Sum of squares of the signals with these half-spectra (Parseval), as far as they lie below 8 kHz."""
+    spectrum = spectrum[:, : int(np.searchsorted(grid.frequency, _REFERENCE_HZ, side="right"))]
     power = (spectrum.real**2 + spectrum.imag**2) if np.iscomplexobj(spectrum) else spectrum**2
-    return (2.0 * power.sum(axis=1) - power[:, 0]) / n_fft
+    return (2.0 * power.sum(axis=1) - power[:, 0]) / grid.n_fft
 
 
 class _Renderer:
@@ -78,14 +81,19 @@ class _Renderer:
         zero = (self.tracks.nasal_zero[rows] / self.style.tract_length).astype(np.float32)
         return tract_response(self.grid.frequency, self.formants[rows], nasal, zero, self.upper)
 
-    def voiced(self, out: np.ndarray, f0: np.ndarray, phase: np.ndarray, rng: np.random.Generator) -> None:
+    def voiced(
+        self, out: np.ndarray, f0: np.ndarray, phase: np.ndarray, creak: np.ndarray, rng: np.random.Generator
+    ) -> None:
         """Adds glottal pulses to ``out``."""
         style, emotion, grid = self.style, self.emotion, self.grid
         times = np.interp(np.arange(1.0, math.floor(phase[-1])), phase, self.tracks.times)
         pitch = self.at(f0, times)
-        times = times + style.jitter * emotion.jitter_factor * rng.standard_normal(len(times)) / pitch
+        creaky = self.at(creak, times)
+        jitter = style.jitter * emotion.jitter_factor + _CREAK_JITTER * creaky
+        times = times + jitter * rng.standard_normal(len(times)) / pitch
         level = self.at(self.tracks.voiced_db + self.level, times)
-        level += style.shimmer_db * emotion.jitter_factor * rng.standard_normal(len(times)).astype(np.float32)
+        shimmer = style.shimmer_db * emotion.jitter_factor + _CREAK_DB * creaky
+        level += shimmer.astype(np.float32) * rng.standard_normal(len(times)).astype(np.float32)
         keep = (self.at(self.tracks.voiced_db, times) > _AUDIBLE_DB) & (times > 0.0)
         times, pitch, level = times[keep], pitch[keep], level[keep]
         # Vocal effort: louder syllables are brighter too (Sluijter & van Heuven 1996).
@@ -98,7 +106,7 @@ class _Renderer:
             part = slice(start, start + _CHUNK)
             spectrum = glottal_spectrum(grid.frequency, pitch[part], tilt[part])
             spectrum *= self.tract(times[part])
-            scale = 10.0 ** (level[part] / 20.0) * np.sqrt(rate / (pitch[part] * _band_power(spectrum, grid.n_fft)))
+            scale = 10.0 ** (level[part] / 20.0) * np.sqrt(rate / (pitch[part] * _band_power(spectrum, grid)))
             first = (times[part] - _LEAD_SECONDS) * rate
             sample = np.floor(first).astype(np.int64)
             delay = ((first - sample) / rate + _LEAD_SECONDS).astype(np.float32)
@@ -127,7 +135,7 @@ class _Renderer:
             part = frames[start : start + _CHUNK]
             white = rng.standard_normal((len(part), length), dtype=np.float32) * window
             spectrum = spectrum_of(part * hop / grid.sample_rate)
-            scale = (1.0 / np.sqrt(_band_power(spectrum, grid.n_fft))).astype(np.float32)
+            scale = (1.0 / np.sqrt(_band_power(spectrum, grid))).astype(np.float32)
             block = fft.irfft(fft.rfft(white, grid.n_fft, axis=1) * (spectrum * scale[:, None]), grid.n_fft, axis=1)
             _overlap_add(shaped, block, part * hop - hop)
         out += shaped[: len(out)] * amplitude
@@ -204,19 +212,24 @@ def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16
     """Renders a plan: float32, round(seconds * sample_rate) samples, peak below 1.
 
     The active level is :data:`SPEECH_DBFS` plus the speaker's and the emotion's loudness. Any sample rate from 8 kHz
-    works; the same plan and generator give the same voice with more or less treble. Raises `InputError` below 8 kHz.
+    works; the same plan and generator give the same speech, moment by moment, with more or less treble; only the
+    grains of its noises differ. Raises `InputError` below 8 kHz.
     """
     if sample_rate < 8000:
         raise InputError(f"sample_rate is {sample_rate}: the voice needs at least 8000 Hz")
-    style, emotion = SPEAKERS[plan.speaker], VOICE_EMOTIONS[plan.emotion]
+    # A stream for each use: how much one draws may depend on the sample rate.
+    streams = rng.spawn(9)
+    style = session_voice(SPEAKERS[plan.speaker], streams[0])
+    emotion = shown(VOICE_EMOTIONS[plan.emotion], plan.strength)
     count = round(plan.seconds * sample_rate)
-    tracks = articulate(plan, emotion, rng)
-    level = energy_contour(plan, tracks.times)
-    f0 = pitch_contour(plan, style, emotion, tracks.times, rng)
+    tracks = articulate(plan, emotion, streams[1])
+    level = energy_contour(plan, tracks.times, streams[2])
+    creak = creak_contour(plan, tracks.times, streams[3])
+    f0 = pitch_contour(plan, style, emotion, tracks.times, streams[4]) * _CREAK_F0**creak
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (f0[1:] + f0[:-1])) / TRACK_RATE])
     renderer = _Renderer(tracks, level, style, emotion, _Grid.of(sample_rate))
     audio = np.zeros(count, np.float32)
-    renderer.voiced(audio, f0, phase, rng)
+    renderer.voiced(audio, f0, phase, creak, streams[5])
     audio *= _levelling(audio, _amplitude(tracks.voiced_db, level), sample_rate)
 
     clock = np.arange(count) / sample_rate
@@ -230,7 +243,7 @@ def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16
     hop = int(0.008 * sample_rate)
     audible = (tracks.voiced_db > _AUDIBLE_DB) | (tracks.aspiration_db > _AUDIBLE_DB)
     frames = _active_frames(audible, count, hop, sample_rate)
-    renderer.noise(audio, amplitude, frames, hop, renderer.tract, rng)
+    renderer.noise(audio, amplitude, frames, hop, renderer.tract, streams[8])
 
     amplitude = np.interp(clock, tracks.times, _amplitude(tracks.noise_db, level)).astype(np.float32)
     hop = int(0.005 * sample_rate)
@@ -243,17 +256,17 @@ def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16
         centre = renderer.at(tracks.noise_hz, times) / np.float32(size)
         return noise_spectrum(frequency, centre, renderer.at(tracks.noise_width_hz, times))
 
-    renderer.noise(audio, amplitude, frames, hop, frication, rng)
+    renderer.noise(audio, amplitude, frames, hop, frication, streams[6])
 
     wanted = 10.0 ** ((SPEECH_DBFS + style.loudness_db + emotion.loudness_db) / 20.0)
     audio *= np.float32(wanted / max(_active_rms(audio, plan, sample_rate), 1e-9))
 
-    breath = _breaths(plan, tracks.times, rng)
+    breath = _breaths(plan, tracks.times, streams[7])
     amplitude = np.interp(clock, tracks.times, breath).astype(np.float32)
     hop = int(0.008 * sample_rate)
     frames = _active_frames(breath > 0.0, count, hop, sample_rate)
-    renderer.noise(audio, amplitude, frames, hop, renderer.tract, rng)
-    audio += _room(count, sample_rate, rng)
+    renderer.noise(audio, amplitude, frames, hop, renderer.tract, streams[8])
+    audio += _room(count, sample_rate, streams[8])
     return _limit(audio)
 
 

@@ -1,0 +1,72 @@
+"""Recordings of the generated corpus as rows: the same arguments always give the same rows, in any process."""
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from a2g_jax.data.rows import Prepared, prepare_recording
+from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.data.talker.recordings import cast, talk
+from a2g_jax.data.talker.speakers import SPEAKERS
+from a2g_jax.data.talker.views.capture import add_jitter
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+
+#: Arguments of :func:`~a2g_jax.data.talker.recordings.talk` for one recording.
+Role: TypeAlias = dict[str, Any]
+
+# Beside the streams that talk() splits a recording's seed into.
+_JITTER = 1000
+
+
+@dataclass(frozen=True)
+class TalkerOptions:
+    """How generated recordings are made; the same for all of a corpus."""
+
+    minutes: float = 30.0
+    seed: int = 0
+    fps: float = 30.0
+    speakers: tuple[str, ...] = ()
+    """Some of :data:`~a2g_jax.data.talker.speakers.SPEAKERS`; empty for all."""
+    emotions: tuple[str, ...] = ()
+    """Some of :data:`~a2g_jax.data.talker.emotions.VOICE_EMOTIONS`; empty for all."""
+    jitter: float = 0.0
+    """Degrees of capture noise: see :func:`~a2g_jax.data.talker.views.capture.add_jitter`."""
+    fingers: bool = False
+    """The 52 joints with fingers instead of the 22 of the body."""
+
+    def __post_init__(self) -> None:
+        for flag, names, known in (
+            ("speakers", self.speakers, SPEAKERS),
+            ("emotions", self.emotions, VOICE_EMOTIONS),
+        ):
+            unknown = [name for name in names if name not in known]
+            if unknown:
+                raise InputError(f"--{flag}: there is no {', '.join(unknown)}; there are: {', '.join(known)}.")
+            if len(set(names)) < len(names):
+                raise InputError(f"--{flag}: a name comes twice in {','.join(names)}; name each once.")
+        if not 0.0 <= self.jitter <= 45.0:
+            raise InputError(f"--jitter: expected degrees from 0 to 45; got {self.jitter:g}.")
+
+    def recipe(self) -> dict[str, Any]:
+        """What a manifest keeps; speakers and emotions by name even if all take part."""
+        return {
+            "reader": "talker",
+            **asdict(self),
+            "speakers": list(self.speakers or SPEAKERS),
+            "emotions": list(self.emotions or VOICE_EMOTIONS),
+        }
+
+    def roles(self) -> list[Role]:
+        """Who says what in each recording."""
+        return cast(self.minutes, self.seed, self.speakers, self.emotions)
+
+
+def generate_rows(role: Role, fps: float, jitter: float, fingers: bool, mel: MelConfig) -> Prepared:
+    """One generated recording as rows."""
+    recording = talk(**role, fps=fps, sample_rate=mel.sample_rate, fingers=fingers)
+    if jitter > 0.0:
+        rng = np.random.default_rng([role["seed"], _JITTER])
+        recording = replace(recording, motion=add_jitter(recording.motion, jitter, rng))
+    return prepare_recording(recording, fps, mel, "all" if fingers else "body")

@@ -1,0 +1,86 @@
+"""Worker processes that work ahead in order, die with their parent, and say so when they die before it."""
+
+import itertools
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TypeVar
+
+from a2g_jax.errors import A2GError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class WorkerDiedError(A2GError):
+    """A worker process ended before its work was done, killed from outside or for want of memory."""
+
+
+@contextmanager
+def worker_pool(workers: int, mend: str, nice: int = 0) -> Iterator[ProcessPoolExecutor]:
+    """A pool of fresh processes; work that has not begun when the block ends is dropped.
+
+    Args:
+        mend: what the user can do if a worker dies.
+        nice: how far the workers step back behind other processes (see ``nice(1)``).
+
+    Raises:
+        WorkerDiedError: a worker died.
+    """
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(nice,))
+    try:
+        with _interrupts_held():
+            pool.submit(int)  # the first piece of work starts all processes
+        yield pool
+    except BrokenProcessPool:
+        raise WorkerDiedError(f"a worker process died, killed from outside or for want of memory; {mend}.") from None
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def in_order(pool: ProcessPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], ahead: int) -> Iterator:
+    """Results of the items, in their order, never more than ``ahead`` of them worked on or waiting."""
+    rest = iter(items)
+    waiting: deque[Future[Result]] = deque(pool.submit(work, item) for item in itertools.islice(rest, ahead))
+    while waiting:
+        yield waiting.popleft().result()
+        waiting.extend(pool.submit(work, item) for item in itertools.islice(rest, 1))
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits until the block ends; processes started in it never get it.
+
+    It reaches every process of a terminal, and a worker that is still starting would die of it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin(nice: int) -> None:
+    # The parent alone decides what Ctrl-C means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if nice and hasattr(os, "nice"):
+        os.nice(nice)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A killed parent cannot end its workers, which would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,77 @@
+"""``a2g prepare talker``: its flags, what they refuse, and the same corpus from any number of workers."""
+
+import numpy as np
+import pytest
+from test_prepare_resume import contents
+
+from a2g_jax.cli import main
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.generated import TalkerOptions
+from a2g_jax.data.make import prepare_talker
+from a2g_jax.data.talker import recordings
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Recordings of three seconds."""
+    monkeypatch.setattr(recordings, "RECORDING_SECONDS", 3.0)
+
+
+def test_any_number_of_workers_makes_the_same_corpus(tmp_path, short):
+    options = TalkerOptions(minutes=0.3, seed=7, jitter=1.0)
+    made = [contents(prepare_talker(tmp_path / str(n), options, workers=n).path) for n in (1, 2, 3)]
+    assert made[0] == made[1] == made[2]
+    assert len(made[0]) == 5 + 6
+
+
+def test_flags(tmp_path, short, capsys):
+    command = ["prepare", "talker", "--minutes", "0.2", "--seed", "3", "--speakers", "ada, bruno", "--workers", "1"]
+    plain, noisy, fingers = (str(tmp_path / name) for name in ("plain", "noisy", "fingers"))
+    assert main([*command, "--emotions", "anger", "--out", plain]) == 0
+    assert "4 recordings, 0.2 minutes, 22 joints at 30 fps" in capsys.readouterr().out
+    corpus = Corpus.open(plain)
+    assert {entry.speaker for entry in corpus.recordings} == {"ada", "bruno"}
+    assert {entry.emotion for entry in corpus.recordings} == {"anger"}
+    wanted = {"reader": "talker", "minutes": 0.2, "seed": 3, "fps": 30.0, "speakers": ["ada", "bruno"]}
+    assert wanted.items() <= corpus.recipe.items()
+    assert (corpus.recipe["emotions"], corpus.recipe["jitter"], corpus.recipe["fingers"]) == (["anger"], 0.0, False)
+    assert main([*command, "--emotions", "anger", "--jitter", "2", "--out", noisy]) == 0
+    jittered = Corpus.open(noisy)
+    np.testing.assert_array_equal(jittered.audio, corpus.audio)
+    assert jittered.recipe["jitter"] == 2.0
+    jerk = [np.abs(np.diff(np.asarray(c.pose[:90]), n=3, axis=0)).mean() for c in (corpus, jittered)]
+    assert jerk[1] > 3 * jerk[0]
+    assert main([*command, "--emotions", "anger", "--fingers", "--out", fingers]) == 0
+    with_fingers = Corpus.open(fingers)
+    assert with_fingers.skeleton.joints == 52
+    np.testing.assert_array_equal(with_fingers.pose[:, :22], corpus.pose)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["talker", "--speakers", "ada,zoe"], "--speakers: there is no zoe; there are: ada, bruno,"),
+        (["talker", "--emotions", "joy"], "--emotions: there is no joy; there are: neutral,"),
+        (["talker", "--speakers", ","], "--speakers: names nobody"),
+        (["talker", "--speakers", "ada,ada"], "a name comes twice in ada,ada"),
+        (["talker", "--jitter", "90"], "--jitter: expected degrees from 0 to 45; got 90"),
+        (["talker", "--jitter", "much"], "expected a number above 0; got 'much'"),
+        (["talker", "--workers", "0"], "from 1 to 1000; got '0'"),
+        (["talker", "--on-demand"], "stores 60 minutes and generates what is beyond them in training; 30 are not more"),
+        (["talker", "--minutes", "0.1"], "are too few"),
+        (["talker", "--joints", "all"], "--joints is for recordings"),
+        (["folder", ".", "--speakers", "ada"], "--speakers is for 'a2g prepare talker'"),
+        (["folder", ".", "--on-demand"], "--on-demand is for 'a2g prepare talker'"),
+        (["folder", ".", "--fingers"], "--fingers is for 'a2g prepare talker'"),
+    ],
+)
+def test_refusals(tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(["prepare", *arguments, "--out", "c"])
+    except SystemExit as stop:
+        status = stop.code
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("a2g: ")]
+    assert status == 2
+    assert message in line
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,28 @@
+"""``a2g demo --train``, made small: generates its corpus, trains on it, and shows what came out."""
+
+import dataclasses
+
+from conftest import TOY_MODEL
+
+from a2g_jax import commands
+from a2g_jax.cli import main
+from a2g_jax.data.talker import recordings
+from a2g_jax.models import find_model
+from a2g_jax.training.config import TRAIN_PRESETS
+
+
+def test_demo_trains(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(commands, "DEMO_MINUTES", 0.3)
+    monkeypatch.setattr(recordings, "RECORDING_SECONDS", 6.0)
+    entry = find_model("audio2gestures")
+    monkeypatch.setitem(entry.presets, "tiny", dataclasses.replace(entry.presets["tiny"], **TOY_MODEL))
+    small = dataclasses.replace(TRAIN_PRESETS["tiny"], steps=6, batch_size=2, checkpoint_every=3)
+    monkeypatch.setitem(TRAIN_PRESETS, "tiny", small)
+    out = tmp_path / "demo"
+    command = ["demo", "--train", "--out", str(out), "--samples", "1", "--formats", "npz"]
+    assert main(command) == 0
+    assert {"corpus", "run", "sample_00.npz"} <= {path.name for path in out.iterdir()}
+    first = (out / "sample_00.npz").read_bytes()
+    # Again, it finds its corpus and its run.
+    assert main(command) == 0
+    assert (out / "sample_00.npz").read_bytes() == first
