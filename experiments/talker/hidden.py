@@ -1,6 +1,6 @@
 """Is what the corpus calls hidden really not in the audio?
 
-    python -m experiments.talker.hidden [--takes 12] [--permutations 40] [--seed 0]
+    python -m experiments.talker.hidden [--takes 10] [--permutations 20] [--seed 0]
 
 Hand, family, place and hold of each gesture unit, guessed from features of the audio around its strokes. One classifier
 a speaker, on neutral speech, cross-validated by recording: speakers and emotions differ in their preferences and are
@@ -103,7 +103,7 @@ def seen(moves: movement.Paths, speed: np.ndarray, apexes: np.ndarray) -> np.nda
 def model(name: str, seed: int) -> Any:
     """Small classifiers, strongly regularised: a speaker has some two hundred units."""
     if name == "forest":
-        return RandomForestClassifier(100, min_samples_leaf=3, random_state=seed)
+        return RandomForestClassifier(50, min_samples_leaf=3, random_state=seed)
     if name == "majority":
         return DummyClassifier()
     return make_pipeline(StandardScaler(), LogisticRegression(C=0.02, max_iter=1000))
@@ -161,8 +161,8 @@ def compare(found: list[dict[str, np.ndarray]], takes: list[np.ndarray], seed: i
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """How much is generated, and how often labels are shuffled."""
-    parser.add_argument("--takes", type=int, default=12, help="recordings of a minute for each speaker")
-    parser.add_argument("--permutations", type=int, default=40)
+    parser.add_argument("--takes", type=int, default=10, help="recordings of a minute for each speaker")
+    parser.add_argument("--permutations", type=int, default=20)
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:

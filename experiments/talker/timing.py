@@ -1,6 +1,6 @@
 """When strokes arrive, against the syllables they belong to.
 
-    python -m experiments.talker.timing [--minutes 24] [--seed 0]
+    python -m experiments.talker.timing [--minutes 48] [--seed 0]
 
 Three clocks: what the truth says; the syllable's energy peak measured from the audio; the stroke's arrival measured
 from the motion. Arrival is the first moment after a burst of the faster wrist at which it has slowed to 35 % of the

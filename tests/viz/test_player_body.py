@@ -51,11 +51,11 @@ def test_extra_points_are_rigid_to_their_joints():
         np.testing.assert_allclose(apart, np.linalg.norm(offset), atol=1e-5)
 
 
-def test_visor_looks_where_the_head_turns():
+def test_eyes_look_where_the_head_turns():
     motion = waving(60)
     body = build_body(motion.skeleton)
     points = body_points(motion, body)
-    origin, up, left, right = body.frames[body.shapes[[s.tint for s in body.shapes].index("visor")].start[0]]
+    origin, up, left, right = body.frames[body.shapes[[s.tint for s in body.shapes].index("eye")].start[0]]
     y, x = points[:, up] - points[:, origin], points[:, left] - points[:, right]
     front = np.cross(x, y)
     turn = 0.4 * np.sin(2 * np.pi * np.arange(60) / 30)
@@ -65,7 +65,7 @@ def test_visor_looks_where_the_head_turns():
 def test_parts_are_of_human_size_and_refer_to_what_exists():
     body = build_body(body_skeleton())
     for shape in body.shapes:
-        assert 0.005 < min(shape.start_radius, shape.end_radius) <= max(shape.start_radius, shape.end_radius) < 0.17
+        assert 0.003 < min(shape.start_radius, shape.end_radius) <= max(shape.start_radius, shape.end_radius) < 0.17
         assert shape.frame < len(body.frames)
         for anchor in (shape.start, shape.end):
             assert int(anchor[0]) < (len(body.frames) if len(anchor) == 4 else len(body.points))

@@ -1,6 +1,9 @@
-"""What the page shows: a motion with its label, and spans of time drawn as lanes under the waveform."""
+"""What the page shows: motions with their labels, and lanes of time under the waveform."""
 
 from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
 
 from a2g_jax.geometry.motion import Motion
 
@@ -17,6 +20,86 @@ class Track:
     name: str
     spans: tuple[tuple[float | int, float | int, str, str], ...]
 
+    def encoded(self) -> dict:
+        """As JSON for the page."""
+        return {"name": self.name, "spans": [list(span) for span in self.spans]}
+
+
+@dataclass(frozen=True)
+class Bars:
+    """A lane of bars, such as syllables as high as their accent.
+
+    Each bar is ``(start, end, height, text, note)``: seconds, 0 to 1, what is written in it, and what pointing at it
+    tells besides.
+    """
+
+    name: str
+    bars: tuple[tuple[float | int, float | int, float | int, str, str], ...]
+
+    def encoded(self) -> dict:
+        """As JSON for the page."""
+        return {"name": self.name, "bars": [list(bar) for bar in self.bars]}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A lane with a curve, such as the pitch of the voice; gaps where the values are NaN."""
+
+    name: str
+    rate: float
+    """Values per second; the first is at time zero."""
+    values: Float[np.ndarray, " N"]
+    unit: str = ""
+
+    def encoded(self) -> dict:
+        """As JSON for the page."""
+        values = [round(float(value), 2) if np.isfinite(value) else None for value in self.values]
+        return {"name": self.name, "rate": self.rate, "values": values, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A moment of one hand or both, such as the apex of a stroke."""
+
+    time: float
+    """Seconds."""
+    size: float
+    """0 to 1."""
+    hand: str
+    """``left``, ``right`` or ``both``."""
+    key: str
+    """Picks the colour and names it: ``beat``, ``offer``, ``sweep``, ``point``, ``list``, ``frame``, or any other."""
+    note: str = ""
+    """What pointing at it tells besides."""
+
+
+@dataclass(frozen=True)
+class Hands:
+    """A lane with the gesture phases of both hands, left above right, and marks on them.
+
+    Phases are ``(start, end, phase)`` in seconds, drawn as what they are: ``preparation`` rises, ``stroke`` is full,
+    ``hold`` is level, ``retraction`` falls, ``rest`` is a line. The phase of the moment is also written under the
+    figure, with the mark's key during a stroke.
+    """
+
+    name: str
+    left: tuple[tuple[float | int, float | int, str], ...]
+    right: tuple[tuple[float | int, float | int, str], ...]
+    marks: tuple[Mark, ...] = ()
+
+    def encoded(self) -> dict:
+        """As JSON for the page."""
+        return {
+            "name": self.name,
+            "left": [list(span) for span in self.left],
+            "right": [list(span) for span in self.right],
+            "marks": [[mark.time, mark.size, mark.hand, mark.key, mark.note] for mark in self.marks],
+        }
+
+
+#: Any lane of the timeline.
+Lane = Track | Bars | Curve | Hands
+
 
 @dataclass(frozen=True, eq=False)
 class Figure:
@@ -25,4 +108,4 @@ class Figure:
     motion: Motion
     label: str
     note: str = ""
-    tracks: tuple[Track, ...] = ()
+    tracks: tuple[Lane, ...] = ()

@@ -15,11 +15,23 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
 from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.encode import encode_audio, encode_positions
-from a2g_jax.viz.player.figure import Figure
+from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.stage import body_points, placement
 
 #: Parts of the script, in the order in which they stand in the page.
-_SCRIPTS = ("math", "figures", "shaders", "webgl", "canvas", "layout", "timeline", "controls", "player")
+_SCRIPTS = (
+    "math",
+    "figures",
+    "shaders",
+    "webgl",
+    "canvas",
+    "layout",
+    "lanes",
+    "hover",
+    "timeline",
+    "controls",
+    "player",
+)
 
 
 def write_page(
@@ -31,6 +43,7 @@ def write_page(
     title: str,
     subtitle: str = "",
     words: Sequence[Word] = (),
+    lanes: Sequence[Lane] = (),
     footer: str = "",
 ) -> None:
     """Write one self-contained HTML file that plays the figures side by side, in sync with the audio.
@@ -47,6 +60,7 @@ def write_page(
         title: heading, also the name of the browser tab.
         subtitle: a line under the heading.
         words: spoken words, written under the waveform.
+        lanes: what else is known about the speech, drawn under the words; each figure's own lanes come after them.
         footer: a line at the foot of the page.
 
     Raises:
@@ -58,6 +72,7 @@ def write_page(
         "audio": encode_audio(audio, sample_rate) if audio.size else "",
         "duration": audio.size / sample_rate if audio.size else max(figure.motion.seconds for figure in figures),
         "words": [[word.text, word.start, word.end] for word in words],
+        "lanes": [lane.encoded() for lane in lanes],
         "figures": [_figure(figure) for figure in figures],
     }
     page = fill_template(
@@ -113,7 +128,7 @@ def _figure(figure: Figure) -> dict:
         "shapes": [shape.encoded() for shape in body.shapes],
         "wrists": list(body.wrists),
         "place": placement(motion, points),
-        "tracks": [{"name": track.name, "spans": [list(span) for span in track.spans]} for track in figure.tracks],
+        "tracks": [track.encoded() for track in figure.tracks],
         **encoded,
     }
 

@@ -61,6 +61,9 @@ def find_roles(skeleton: Skeleton) -> Roles | None:
     chest = _common(parents, known_arms["left"].top, known_arms["right"].top)
     pelvis = _common(parents, known_legs["left"].top, known_legs["right"].top) if known_legs else 0
     head = next((j for j in _by_depth(parents) if "head" in bases[j] and not _HELPER.search(bases[j])), None)
+    if head is None:  # rigs of upper bodies may call it the last of the neck
+        necks = [j for j in _by_depth(parents) if "neck" in bases[j] and not _HELPER.search(bases[j])]
+        head = necks[-1] if necks else None
     neck = head
     if head is not None:
         path = ancestors(parents, head)

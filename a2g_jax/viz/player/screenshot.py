@@ -3,6 +3,7 @@
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path, check_readable
@@ -28,6 +29,17 @@ def find_browser() -> str | None:
         return named
     names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
     return next((found for name in names if (found := shutil.which(name))), None)
+
+
+def _settled(view: Any) -> bytes:
+    """A picture that the next one equals: on a busy machine canvases reach the screen frames after they were drawn."""
+    before, after = b"", view.screenshot(type="png")
+    for _ in range(20):
+        if before == after:
+            break
+        view.wait_for_timeout(150)
+        before, after = after, view.screenshot(type="png")
+    return after
 
 
 def screenshot_page(
@@ -75,7 +87,7 @@ def screenshot_page(
                     view.evaluate(f"() => {{ {script} }}")
                 view.evaluate("time => a2gPlayer.seek(time)", time)
                 view.evaluate("a2gPlayer.still()")
-                view.screenshot(path=str(temporary), type="png")
+                temporary.write_bytes(_settled(view))
             finally:
                 browser.close()
         except Error as error:

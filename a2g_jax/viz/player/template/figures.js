@@ -124,8 +124,12 @@ class Figure {
   }
 
   tints(theme) {
-    const body = linear(this.colour), skin = linear(theme.skin);
-    const blend = (w) => body.map((x, k) => mix(x, skin[k], w));
-    return { body: [...body, 0.25], skin: [...blend(0.72), 0.2], visor: [...body.map((x) => 0.16 * x + 0.01), 0.85], shoe: [...body.map((x) => 0.45 * x), 0.3] };
+    const body = linear(this.colour), skin = linear(theme.skin), cloth = linear(theme.cloth);
+    const shade = (w) => body.map((x, k) => mix(x, cloth[k], w));
+    return {
+      body: [...body, 0.12], legs: [...shade(0.82), 0.08], shoe: [...shade(0.9).map((x) => 0.4 * x), 0.35],
+      skin: [...body.map((x, k) => mix(x, skin[k], 0.93)), 0.16], lips: [...skin.map((x, k) => x * [0.72, 0.5, 0.48][k]), 0.2],
+      hair: [...body.map((x) => 0.12 * x + 0.012), 0.3], eye: [0.012, 0.013, 0.018, 0.9],
+    };
   }
 }

@@ -44,6 +44,7 @@ const PALETTE = ["#4c7fe0", "#e5705a", "#3fa27a", "#8f6fd6", "#dc9a35", "#2f9fb3
 const KEYS = {
   preparation: "#e8ad3d", stroke: "#e0543f", hold: "#8f6fd6", retraction: "#3f9ec4", rest: "#98a3b0",
   left: "#4c7fe0", right: "#e5705a", both: "#3fa27a",
+  beat: "#d98a12", offer: "#16966a", sweep: "#2583c4", point: "#d8433b", list: "#8757cf", frame: "#cf4f9b",
 };
 
 function keyColour(key) {
@@ -58,10 +59,10 @@ function keyColour(key) {
 const THEMES = {
   light: {
     top: "#f4f8fc", horizon: "#d9e2ec", groundA: "#e4e9ef", groundB: "#d3dae3", sun: [2.2, 2.13, 2.0], sky: [0.66, 0.72, 0.82],
-    bounce: [0.42, 0.41, 0.4], shadow: 0.56, contact: 0.75, shadowTint: "#42526b", skin: "#f0e4da",
+    bounce: [0.42, 0.41, 0.4], shadow: 0.56, contact: 0.75, shadowTint: "#42526b", skin: "#e9c4a6", cloth: "#47536a",
   },
   dark: {
     top: "#14181e", horizon: "#2a313b", groundA: "#313944", groundB: "#282f39", sun: [1.9, 1.83, 1.72], sky: [0.34, 0.4, 0.5],
-    bounce: [0.14, 0.15, 0.17], shadow: 0.66, contact: 0.75, shadowTint: "#05070a", skin: "#e6dacf",
+    bounce: [0.14, 0.15, 0.17], shadow: 0.66, contact: 0.75, shadowTint: "#05070a", skin: "#dcb798", cloth: "#475268",
   },
 };

@@ -5,6 +5,7 @@ class Player {
     this.element = (id) => document.getElementById(id);
     this.figures = data.figures.map((figure, index) => new Figure(figure, index));
     this.words = data.words;
+    this.lanes = data.lanes;
     this.duration = Math.max(data.duration, 1e-3);
     this.fastest = Math.max(0.5, ...this.figures.map((figure) => figure.speeds.reduce((a, b) => Math.max(a, b), 0)));
     this.camera = { ...START };
@@ -18,6 +19,7 @@ class Player {
     this.timeline = new Timeline(this);
     this.audio = this.loadAudio(data.audio);
     this.makeLabels();
+    fillLegend(this);
     this.makeControls();
     attachCamera(this.element("view"), this);
     attachKeys(this);
@@ -162,6 +164,7 @@ class Player {
     this.placeLabels(width, height);
     this.timeline.draw();
     this.showClock();
+    this.showDoing();
     this.adapt(stamp);
     if (this.opened) { this.opened(true); this.opened = null; }
   }
@@ -196,6 +199,13 @@ class Player {
       const label = document.createElement("button"), name = document.createElement("b"), note = document.createElement("span");
       name.textContent = figure.label; note.textContent = figure.note;
       label.append(name, ...(figure.note ? [note] : []));
+      if (doing(figure, 0)) {
+        label.doing = ["left", "right"].map(() => document.createElement("i"));
+        const both = document.createElement("span");
+        both.className = "doing";
+        both.append(...label.doing);
+        label.append(both);
+      }
       label.style.setProperty("--own", figure.colour);
       label.title = `Show ${figure.label} alone, or all again${figure.index < 9 ? ` (${figure.index + 1}, 0)` : ""}`;
       label.addEventListener("click", () => this.solo(this.only === figure.index ? null : figure.index));
@@ -219,6 +229,21 @@ class Player {
       const left = clamp(x - label.wide / 2, 4, width - label.wide - 4), top = clamp(y + 6, band.y + 4, band.y + band.height - label.tall - 6);
       style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
     });
+  }
+
+  // Under each figure, what its hands do.
+  showDoing() {
+    for (const figure of this.shown()) {
+      const label = this.labels[figure.index];
+      if (label.doing) doing(figure, this.now).forEach(({ hand, phase, key }, k) => {
+        const text = `${hand[0].toUpperCase()} ${key || SHORT[phase] || phase}`, part = label.doing[k];
+        if (part.textContent === text) return;
+        part.textContent = text;
+        part.title = `${hand} hand: ${phase}${key ? `, ${key}` : ""}`;
+        part.className = phase;
+        part.style.background = key ? keyColour(key) : "";
+      });
+    }
   }
 
   // After the arrangement changed: which labels there are, and their sizes anew.
@@ -284,6 +309,9 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
+  // What pointing at a place of the closer timeline tells, in CSS pixels from its corner; lanes from top to bottom.
+  tell: (x, y) => player.timeline.tell(x, y) || null,
+  lanes: () => player.timeline.rows().map(({ kind, height, lane, figure }) => ({ kind, height, name: lane ? lane.name : kind, figure: figure ? figure.label : null })),
   // Resolves when a picture of the present moment, at full quality, is on screen.
   still: () => new Promise((done) => requestAnimationFrame((stamp) => {
     player.draw(stamp, true);

@@ -12,10 +12,11 @@ class Timeline {
     this.style();
     this.attach(this.overview.parentElement, (x, width) => x / width * player.duration);
     this.attach(this.detail.parentElement, (x, width) => { const [from, to] = this.window(); return from + x / width * (to - from); });
+    this.hovering = new Hover(this);
   }
 
   style() {
-    const style = getComputedStyle(document.documentElement), names = ["ink", "soft", "faint", "line", "accent", "wave", "wave-past", "raised", "press"];
+    const style = getComputedStyle(document.documentElement), names = ["ink", "soft", "faint", "line", "accent", "wave", "wave-past", "raised", "press", "pitch"];
     this.ink = Object.fromEntries(names.map((name) => [name, style.getPropertyValue("--" + name).trim()]));
     this.sketch = this.strip = null;
   }
@@ -124,7 +125,9 @@ class Timeline {
   rows() {
     const { player } = this, rows = [{ kind: "wave", height: WAVE }];
     if (player.words.length) rows.push({ kind: "words", height: 20 });
-    for (const figure of player.shown()) for (const track of figure.tracks) rows.push({ kind: "track", height: 19, figure, track });
+    const compact = player.shown().length > 1, lane = (lane, figure) => rows.push({ kind: kindOf(lane), height: LANES[kindOf(lane)].height(compact), lane, figure, compact });
+    for (const shared of player.lanes) lane(shared, null);
+    for (const figure of player.shown()) for (const track of figure.tracks) lane(track, figure);
     if (player.shown().some((figure) => figure.wrists.length)) rows.push({ kind: "speed", height: 40 });
     return rows;
   }
@@ -141,7 +144,7 @@ class Timeline {
         this.wave(g, wide, y, WAVE, start, end, this.ink.wave);
         this.wave(g, wide, height, WAVE, start, end, this.ink["wave-past"]);
       } else if (row.kind === "words") this.drawWords(g, at, start, end, y + 14);
-      else if (row.kind === "track") this.drawTrack(g, at, start, end, y, row, wide);
+      else if (row.lane) LANES[row.kind].draw(g, { at, from: start, to: end, y, wide, ink: this.ink, ...row });
       else this.drawSpeeds(g, wide, at, start, end, y + 4, row.height - 6);
       y += row.height;
     }
@@ -150,7 +153,7 @@ class Timeline {
   drawDetail(from, to) {
     const rows = this.rows(), height = rows.reduce((sum, row) => sum + row.height, 0) + 6, { now } = this.player;
     const [g, width] = this.size(this.detail, height);
-    const same = (a, b) => a.length === b.length && a.every((row, i) => row.kind === b[i].kind && row.track === b[i].track);
+    const same = (a, b) => a.length === b.length && a.every((row, i) => row.kind === b[i].kind && row.lane === b[i].lane);
     const old = this.strip, kept = old && old.width === width && old.ratio === this.ratio && old.only === this.player.only
       && from >= old.start - 1e-6 && to <= old.end + 1e-6 && Math.abs(old.at(to) - old.at(from) - width) < 0.5 && same(rows, old.rows);
     if (!kept) { this.makeStrip(rows, height, width, from, to); this.strip.only = this.player.only; }
@@ -165,7 +168,7 @@ class Timeline {
     }
     let y = 4;
     for (const row of rows) {
-      if (row.kind === "track") this.drawName(g, row.figure.colour, this.nameOf(row), y);
+      if (row.lane) this.drawName(g, row.figure ? row.figure.colour : null, this.nameOf(row), row.figure ? y : y - 2);
       if (row.kind === "speed") this.drawName(g, null, `wrist speed, 0–${this.player.fastest.toFixed(1)} m/s`, y - 2);
       y += row.height;
     }
@@ -173,7 +176,26 @@ class Timeline {
     g.fillRect(head - 0.75, 0, 1.5, height);
   }
 
-  nameOf({ figure, track }) { return this.player.figures.length > 1 ? `${figure.label} · ${track.name}` : track.name; }
+  nameOf({ figure, lane, kind }) {
+    const name = LANES[kind].name ? LANES[kind].name(lane) : lane.name;
+    return figure && this.player.figures.length > 1 ? [figure.label, name].filter(Boolean).join(" · ") : name;
+  }
+
+  // What is at a place of the closer look: lines of text, or nothing.
+  tell(x, y) {
+    const [from, to] = this.window(), perPixel = (to - from) / Math.max(this.detail.clientWidth, 1), time = from + x * perPixel;
+    let top = 4;
+    for (const row of this.rows()) {
+      if (y >= top && y < top + row.height) {
+        if (row.lane) return LANES[row.kind].tell(row.lane, time, y - top, 7 * perPixel, row.compact);
+        if (row.kind === "words") { const word = this.player.words.find(([, start, end]) => time >= start && time < end); return word && [word[0], `${seconds(word[1])} to ${seconds(word[2])}`]; }
+        if (row.kind === "speed") return [seconds(time), ...this.player.shown().map((figure) => `${figure.label}: ${figure.speeds[Math.round(figure.frameAt(time))].toFixed(2)} m/s`)];
+        return null;
+      }
+      top += row.height;
+    }
+    return null;
+  }
 
   drawName(g, colour, name, y) {
     g.font = "11px system-ui, sans-serif";
@@ -197,19 +219,6 @@ class Timeline {
     }
   }
 
-  drawTrack(g, at, from, to, y, { track }, wide) {
-    g.fillStyle = this.ink.press;
-    g.globalAlpha = 0.5; g.fillRect(0, y + 2, wide, 15); g.globalAlpha = 1;
-    g.font = "11px system-ui, sans-serif";
-    for (const [start, end, text, key] of track.spans) {
-      if (end < from || start > to) continue;
-      const x = Math.max(at(start), -4), far = Math.max(at(end) - x - 1, 1.5);
-      g.fillStyle = keyColour(key);
-      g.globalAlpha = 0.85; g.beginPath(); g.roundRect(x, y + 2, far, 15, 3); g.fill(); g.globalAlpha = 1;
-      if (text && g.measureText(text).width < far - 9) { g.fillStyle = "#fff"; g.fillText(text, x + 5, y + 13.5); }
-    }
-  }
-
   drawSpeeds(g, width, at, from, to, y, height) {
     g.lineWidth = 1.3; g.lineJoin = "round";
     for (const figure of this.player.shown()) {
@@ -217,6 +226,15 @@ class Timeline {
       const a = Math.max(0, Math.floor(from * figure.fps)), b = Math.min(figure.frames - 1, Math.ceil(to * figure.fps)), skip = Math.max(1, Math.floor((b - a) / width));
       for (let t = a - (a % skip); t <= b; t += skip) g.lineTo(at(t / figure.fps), y + height - Math.min(figure.speeds[t] / this.player.fastest, 1) * (height - 2));
       g.stroke(); g.globalAlpha = 1;
+      this.drawApexes(g, figure, at, from, to, (speed) => y + height - Math.min(speed / this.player.fastest, 1) * (height - 2));
+    }
+  }
+
+  drawApexes(g, figure, at, from, to, level) {
+    for (const lane of figure.tracks) for (const [time, , , key] of lane.marks || []) {
+      if (time < from || time > to) continue;
+      diamond(g, at(time), level(figure.speeds[Math.round(figure.frameAt(time))]), 3.4);
+      g.fillStyle = keyColour(key); g.strokeStyle = this.ink.raised; g.lineWidth = 1.2; g.stroke(); g.fill(); g.lineWidth = 1.3;
     }
   }
 }

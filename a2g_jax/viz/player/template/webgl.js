@@ -38,7 +38,7 @@ class WebGLRenderer {
       blur: this.program(BLUR_VERTEX, BLUR_FRAGMENT),
       ground: this.program(GROUND_VERTEX, GROUND_FRAGMENT),
     };
-    this.meshes = [this.mesh(7, 20), this.mesh(3, 10), this.mesh(3, 10), this.mesh(1, 6)];
+    this.meshes = [this.mesh(12, 40), this.mesh(5, 14), this.mesh(3, 10), this.mesh(2, 6)];
     this.empty = gl.createVertexArray();
     this.buffer = gl.createBuffer();
     this.vertexArrays = this.meshes.map((mesh) => this.vertexArray(mesh));
