@@ -1,0 +1,180 @@
+"""NumPy's ``.npy`` and ``.npz`` files from sources that nobody vouches for.
+
+``numpy.load`` allocates what a header claims and, where it is asked to, runs the pickles inside. Here each claim is
+checked against the bytes that are there and against the limits, and arrays of Python objects, where they are asked
+for, go through :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`.
+"""
+
+import io
+import os
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Sequence
+from typing import BinaryIO
+
+import numpy as np
+
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import check_readable
+from a2g_jax.io.untrusted.arrays import check_shape, plain_array, plain_type
+from a2g_jax.io.untrusted.budget import CONVERT, Budget, Limits, clip
+from a2g_jax.io.untrusted.pickles import decode_with
+
+_MAGIC = b"\x93NUMPY"
+_LONGEST_HEADER = 10_000
+#: Largest piece read at once, other than an array: a list of members of more is no archive of arrays.
+_LARGEST_READ = 8 * 2**20
+_ITEM = r"'descr': *+'([^']{1,15})'|'fortran_order': *+(True|False)|'shape': *+\(([0-9L, ]{0,999})\)"
+_HEADER = re.compile(rf"\{{ *+(?:(?:{_ITEM}),? *+){{3}}\}}")
+_SIZE = re.compile(r"[0-9]{1,18}L?")
+# What zipfile and zlib raise on damaged bytes.
+_DAMAGE = (
+    zipfile.BadZipFile, zlib.error, struct.error, ArithmeticError, EOFError, IndexError, KeyError, MemoryError,
+    NotImplementedError, OSError, RuntimeError, ValueError,
+)  # fmt: skip
+
+
+def read_npy(path: str | os.PathLike[str], *, objects: bool = False, limits: Limits | None = None) -> np.ndarray:
+    """The array in an ``.npy`` file.
+
+    Args:
+        path: the file.
+        objects: whether arrays of Python objects are read too (as plain values only).
+        limits: how much it may take.
+
+    Raises:
+        InputError: no such file, damaged, beyond the limits, of records or dates, or of Python objects that are
+            refused or not asked for.
+    """
+    path = check_readable(path, "an .npy array")
+    budget = Budget(str(path), limits or Limits())
+    budget.charge(path.stat().st_size, 0)
+    return _array(path.read_bytes(), objects, budget)
+
+
+def read_npz(
+    path: str | os.PathLike[str],
+    names: Sequence[str] | None = None,
+    *,
+    objects: bool = False,
+    limits: Limits | None = None,
+) -> dict[str, np.ndarray]:
+    """The arrays in an ``.npz`` archive, by name.
+
+    Args:
+        path: the file.
+        names: which arrays to read, without ``.npy``; None reads all.
+        objects: whether arrays of Python objects are read too (as plain values only).
+        limits: how much all of them may take, unpacked.
+
+    Raises:
+        InputError: no such file, no archive, damaged, without an array that is asked for, or what
+            :func:`read_npy` raises.
+    """
+    path = check_readable(path, "an .npz archive")
+    budget = Budget(str(path), limits or Limits())
+    with path.open("rb") as file:
+        try:
+            archive = zipfile.ZipFile(_SmallReads(file))
+        except InputError:
+            raise
+        except _DAMAGE:
+            raise InputError(f"{path}: is not an .npz archive, or is damaged; copy or download it again.") from None
+        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+        missing = [name for name in names or () if name not in members]
+        if missing:
+            raise InputError(f"{path}: has no array {clip(missing[0])}; it has {_some(list(members))}.")
+        return {name: _member(archive, members[name], objects, budget) for name in names or members}
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whole: Budget) -> np.ndarray:
+    name = f"{whole.name}, {clip(info.filename)}"
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise InputError(f"{name}: is packed in a way that NumPy never uses; {CONVERT}.")
+    whole.charge(info.file_size, info.header_offset)
+    try:
+        with archive.open(info) as file:
+            data = file.read(info.file_size)
+            if len(data) != info.file_size or file.read(1):
+                raise EOFError("it is shorter or longer than announced")
+    except _DAMAGE as error:
+        raise InputError(f"{name}: is damaged ({_reason(error)}); copy or download it again.") from None
+    budget = Budget(name, whole.limits)
+    budget.left = whole.left
+    array = _array(data, objects, budget)
+    whole.left = budget.left
+    return array
+
+
+def _array(data: bytes, objects: bool, budget: Budget) -> np.ndarray:
+    dtype, shape, fortran, start = _header(data, budget)
+    content = memoryview(data)[start:]
+    if not dtype.hasobject:
+        return plain_array(content, dtype, shape, "F" if fortran else "C", budget, start)
+    if not objects:
+        raise budget.error(start, f"is an array of Python objects, which are not read from here; {CONVERT}.")
+    array = decode_with(bytes(content), budget)
+    if not isinstance(array, np.ndarray) or array.shape != shape:
+        raise budget.damage(start, f"expected an array of shape {clip(shape)}")
+    return array
+
+
+def _header(data: bytes, budget: Budget) -> tuple[np.dtype, tuple[int, ...], bool, int]:
+    """Type, shape, whether the first axis runs fastest, and where the content begins."""
+    if data[:6] != _MAGIC or len(data) < 12:
+        raise budget.error(0, "is not a NumPy array; expected one as numpy.save writes.")
+    if data[6] not in (1, 2, 3) or data[7] != 0:
+        raise budget.error(6, f"is an array of format {data[6]}.{data[7]}; expected 1.0 to 3.0.")
+    start = 10 if data[6] == 1 else 12
+    size = int.from_bytes(data[8:start], "little")
+    if size > _LONGEST_HEADER or start + size > len(data):
+        raise budget.damage(8, f"a header of {size} bytes")
+    text = data[start : start + size].decode("latin-1").rstrip()
+    if not _HEADER.fullmatch(text):
+        if "'descr': [" in text:
+            raise budget.error(start, f"is an array of records; expected plain numbers or text; {CONVERT}.")
+        raise budget.damage(start, "its header is not as numpy.save writes it")
+    items = [next((part for part in match if part), "") for match in re.findall(_ITEM, text)]
+    found = dict(zip(re.findall(r"'(descr|fortran_order|shape)':", text), items, strict=True))
+    sizes = [part.strip() for part in found.get("shape", "").split(",")]
+    if len(found) != 3 or not all(_SIZE.fullmatch(part) for part in sizes if part):
+        raise budget.damage(start, "its header is not as numpy.save writes it")
+    dtype = plain_type(found["descr"], budget, start, objects=True)
+    shape = check_shape(tuple(int(part.rstrip("L")) for part in sizes if part), budget, start)
+    return dtype, shape, found["fortran_order"] == "True", start + size
+
+
+class _SmallReads(io.RawIOBase):
+    """A file that refuses to be read in large pieces, which ``zipfile`` does for the size that a file claims."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self.file.tell()
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return self.file.seek(offset, whence)
+
+    def read(self, size: int = -1) -> bytes:
+        data = self.file.read(size if 0 <= size <= _LARGEST_READ else _LARGEST_READ + 1)
+        if len(data) > _LARGEST_READ:
+            raise zipfile.BadZipFile("a piece of it is too large")
+        return data
+
+
+def _some(names: list[str]) -> str:
+    shown = ", ".join(clip(name, 30) for name in names[:8])
+    return shown + (" and more" if len(names) > 8 else "") if shown else "none"
+
+
+def _reason(error: BaseException) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__
