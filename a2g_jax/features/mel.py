@@ -84,4 +84,5 @@ def log_mel(
         spectrum = fft.rfft(some, axis=1)
         rows[start : start + _CHUNK] = (spectrum.real**2 + spectrum.imag**2) @ filters
     decibels = 10 * np.log10(np.maximum(rows, 1e-10))
-    return np.maximum(decibels, decibels.max(initial=-100.0) - config.range_db).astype(np.float32)
+    # Again -100 at the least: a logarithm in single precision may round below it on some machines.
+    return np.maximum(decibels, max(-100.0, decibels.max(initial=-100.0) - config.range_db)).astype(np.float32)
