@@ -76,7 +76,9 @@ def test_existing_folders_and_empty_sources_are_refused(tmp_path):
 
 
 def test_audio_and_motion_of_different_takes_are_refused(take):
-    longer = Recording(take.name, np.tile(take.audio, 2), 16000, take.motion, sources=("a.wav", "a.bvh"))
+    longer = Recording(
+        name=take.name, audio=np.tile(take.audio, 2), sample_rate=16000, motion=take.motion, sources=("a.wav", "a.bvh")
+    )
     with pytest.raises(InputError, match=r"a\.wav and a\.bvh: audio lasts 8\.00 s and motion 4\.00 s"):
         prepare_recording(longer, 30.0, MEL)
 
