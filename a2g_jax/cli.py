@@ -10,6 +10,8 @@ from a2g_jax.errors import A2GError, Interrupted
 
 #: Names of the models; the registry itself is imported late, because it costs seconds.
 MODEL_NAMES = ("audio2gestures",)
+#: What can be prepared; the readers themselves are imported late for the same reason.
+READERS = ("talker", "folder")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -98,28 +100,50 @@ def make_parser() -> argparse.ArgumentParser:
     prepare = command(
         "prepare", "Make a corpus from recordings, or generate one. Stopped before its end, the same command goes on."
     )
-    prepare.add_argument("reader", choices=("talker", "folder"), help="talker: generate; folder: WAV and BVH pairs")
-    prepare.add_argument("source", nargs="?", help="the folder of recordings (for 'folder')")
-    prepare.add_argument("--out", required=True, metavar="CORPUS", help="folder to make")
-    prepare.add_argument("--minutes", type=_positive, help="minutes of talk to generate (default: 30)")
+    prepare.add_argument("reader", nargs="?", choices=READERS, metavar="NAME", help="talker, or a data set: see --list")
+    prepare.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
+    prepare.add_argument("--list", action="store_true", help="say what can be prepared, and do nothing")
+    prepare.add_argument("--out", metavar="CORPUS", help="folder to make")
     prepare.add_argument("--seed", type=_seed, default=0, help="of the generated talk and of the splits (default: 0)")
-    prepare.add_argument("--fps", type=_positive, default=30.0, help="frames per second (default: 30)")
-    prepare.add_argument("--speakers", metavar="NAMES", help="who talks, comma-separated (default: all)")
-    prepare.add_argument("--emotions", metavar="NAMES", help="in which emotions, comma-separated (default: all)")
-    prepare.add_argument("--jitter", type=_positive, metavar="DEGREES", help="capture noise on the generated motion")
-    prepare.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the 22 of the body")
-    prepare.add_argument(
-        "--on-demand",
-        action="store_true",
-        help="store the first 60 minutes; the rest is for training and generated in training, 30 minutes at a time",
-    )
     prepare.add_argument(
         "--workers", type=_count, help="processes; the corpus is the same for any (default: one a core)"
     )
     prepare.add_argument(
+        "--features", metavar="PAPER", help="rate, mel bands and poses of a paper (default: audio2gestures; see --list)"
+    )
+    prepare.add_argument("--fps", type=_fps, help="frames per second (default: what the paper or the data set has)")
+    prepare.add_argument(
+        "--waveform", action="store_true", help="keep the audio too, for models that look at it otherwise"
+    )
+    recorded = prepare.add_argument_group("of recordings")
+    recorded.add_argument(
         "--joints",
-        choices=("body", "all"),
-        help="body: the 22 body joints, if they can be found by name; all: the rig as it is (default: body)",
+        choices=("body", "upper-body", "all"),
+        help="body: any rig on 22 joints; upper-body: on 47 with fingers; all: the rig as it is (default: body)",
+    )
+    recorded.add_argument(
+        "--pose",
+        choices=("6d", "exponential", "directions", "keypoints"),
+        help="how poses are written down (default: what the paper or the data set has)",
+    )
+    recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
+    recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")
+    recorded.add_argument("--limit", type=_number(int, 1, 10**9, "a whole number above 0"), help="take only so many")
+    generated = prepare.add_argument_group("of generated talk")
+    generated.add_argument("--minutes", type=_positive, help="minutes of talk to generate (default: 30)")
+    generated.add_argument("--speakers", metavar="NAMES", help="who talks, comma-separated (default: all)")
+    generated.add_argument("--emotions", metavar="NAMES", help="in which emotions, comma-separated (default: all)")
+    generated.add_argument("--jitter", type=_positive, metavar="DEGREES", help="capture noise on the generated motion")
+    generated.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the body's 22")
+    generated.add_argument(
+        "--view",
+        choices=("body", "beat", "ted", "ted-expressive", "s2g"),
+        help="show the speakers as a data set does: joints, bone directions or keypoints (default: body)",
+    )
+    generated.add_argument(
+        "--on-demand",
+        action="store_true",
+        help="store the first 60 minutes; the rest is for training and generated in training, 30 minutes at a time",
     )
 
     train = command(

@@ -3,6 +3,7 @@
 import argparse
 import dataclasses
 import os
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,13 @@ import jax
 
 from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.datasets import NAMES, find_data_set
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_folder, prepare_talker
+from a2g_jax.data.make import prepare_data_set, prepare_talker
 from a2g_jax.data.on_demand import OnDemand
+from a2g_jax.data.settings import PRESETS, Features, find_features
 from a2g_jax.data.talker.recordings import talk
+from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation.deliver import check_formats, deliver
@@ -42,31 +46,19 @@ def _cache_compilations() -> None:
 
 def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g prepare``."""
-    if options.reader == "talker":
-        if options.source is not None:
-            raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
-        if options.joints is not None:
-            raise InputError("--joints is for recordings; a generated corpus has 22 joints, or 52 with --fingers.")
-        corpus = prepare_talker(
-            options.out,
-            talker_options(options),
-            workers=options.workers,
-            on_demand=OnDemand() if options.on_demand else None,
-        )
-    else:
-        if options.source is None:
-            raise InputError("name the folder: a2g prepare folder SOURCE --out CORPUS.")
-        for name in ("minutes", "speakers", "emotions", "jitter", "fingers", "on_demand"):
-            if getattr(options, name) not in (None, False):
-                flag = name.replace("_", "-")
-                raise InputError(f"--{flag} is for 'a2g prepare talker'; a folder is prepared as it is.")
-        corpus = prepare_folder(
-            options.source, options.out, options.seed, options.fps, options.joints or "body", options.workers
-        )
+    if options.list:
+        _list_data_sets()
+        return
+    if options.reader is None:
+        raise InputError("name what to prepare: 'a2g prepare talker', or a data set ('a2g prepare --list').")
+    if options.out is None:
+        raise InputError("--out is needed: the folder to make.")
+    corpus = _prepare_generated(options) if options.reader == "talker" else _prepare_recorded(options)
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
+    kinds = {"directions": "bone directions", "keypoints": "keypoints"}
     print(
         f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
-        f" {corpus.skeleton.joints} joints at {corpus.fps:g} fps ("
+        f" {corpus.rows} {kinds.get(corpus.representation, 'joints')} at {corpus.fps:g} fps ("
         + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
         + ")"
     )
@@ -79,16 +71,85 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
         )
 
 
+#: Flags of ``a2g prepare`` that only generated corpora have, and those that only recorded ones have.
+_GENERATED = ("minutes", "speakers", "emotions", "jitter", "fingers", "view", "on_demand")
+_RECORDED = ("source", "joints", "pose", "random_split", "skip_broken", "limit")
+
+
+def _refuse_flags(options: argparse.Namespace, names: tuple[str, ...], reason: str) -> None:
+    for name in names:
+        if getattr(options, name) not in (None, False):
+            raise InputError(f"--{name.replace('_', '-')} is for {reason}")
+
+
+def _prepare_generated(options: argparse.Namespace) -> Corpus:
+    if options.source is not None:
+        raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
+    _refuse_flags(options, _RECORDED, "recordings; a generated corpus has what --view and --fingers show.")
+    return prepare_talker(
+        options.out,
+        talker_options(options),
+        _features(options),
+        workers=options.workers,
+        on_demand=OnDemand() if options.on_demand else None,
+    )
+
+
+def _prepare_recorded(options: argparse.Namespace) -> Corpus:
+    if options.source is None:
+        raise InputError(f"name the folder: a2g prepare {options.reader} SOURCE --out CORPUS.")
+    _refuse_flags(options, _GENERATED, "'a2g prepare talker'; recordings are prepared as they are.")
+    reader = find_data_set(options.reader)
+    features = _features(options)
+    if options.features is None:
+        features = dataclasses.replace(features, fps=options.fps or reader.fps, pose=options.pose or reader.pose)
+    return prepare_data_set(
+        options.reader,
+        options.source,
+        options.out,
+        features,
+        seed=options.seed,
+        official=not options.random_split,
+        skip_broken=options.skip_broken,
+        limit=options.limit,
+        workers=options.workers,
+    )
+
+
+def _features(options: argparse.Namespace) -> Features:
+    """The settings of a paper with what the flags change."""
+    features = find_features(options.features or "audio2gestures")
+    asked = {name: getattr(options, name) for name in ("fps", "pose", "joints", "waveform")}
+    return dataclasses.replace(features, **{name: value for name, value in asked.items() if value})
+
+
+def _list_data_sets() -> None:
+    for name in NAMES:
+        reader = find_data_set(name)
+        print(f"{name}: {reader.title}, {reader.fps:g} fps")
+        if reader.about:
+            print(textwrap.indent(textwrap.fill(reader.about, 96), "    "))
+    print("talker: generated recordings, whose truth is known (see 'a2g talk')")
+    print("\nfeatures of the papers (--features):")
+    for name, features in PRESETS.items():
+        mel = f"{features.mel.bands} mel bands" + (f" x {features.mel.stack}" if features.mel.stack > 1 else "")
+        wave = ", waveform" if features.waveform else ""
+        print(f"{name}: {features.fps:g} fps, {mel}, {features.pose}, joints: {features.joints}{wave}")
+
+
 def talker_options(options: argparse.Namespace) -> TalkerOptions:
     """What the flags of ``a2g prepare talker`` ask for."""
+    view = options.view or "body"
+    fps = options.fps or (find_features(options.features).fps if options.features else find_view(view).fps)
     return TalkerOptions(
         minutes=options.minutes or 30.0,
         seed=options.seed,
-        fps=options.fps,
+        fps=fps,
         speakers=_names("speakers", options.speakers),
         emotions=_names("emotions", options.emotions),
         jitter=options.jitter or 0.0,
         fingers=options.fingers,
+        view=view,
     )
 
 

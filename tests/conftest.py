@@ -53,13 +53,13 @@ def toy_corpus(tmp_path_factory):
     """Six generated recordings of ten seconds at 30 fps."""
     from a2g_jax.data.corpus import Corpus
     from a2g_jax.data.prepare import prepare_recording, write_corpus
+    from a2g_jax.data.settings import Features
     from a2g_jax.data.talker.recordings import talk
-    from a2g_jax.features.mel import MelConfig
 
-    mel = MelConfig()
-    rows = (prepare_recording(talk(10.0, seed, name=f"take{seed}"), 30.0, mel) for seed in range(6))
+    features = Features()
+    rows = (prepare_recording(talk(10.0, seed, name=f"take{seed}"), features) for seed in range(6))
     path = tmp_path_factory.mktemp("toy") / "corpus"
-    write_corpus(path, rows, fps=30.0, mel=mel, recipe={"reader": "talker"})
+    write_corpus(path, rows, features=features, recipe={"reader": "talker"})
     return Corpus.open(path)
 
 

@@ -193,7 +193,9 @@ def test_any_rig_trains_as_it_is(capsys, tmp_path):
     write_audio(tmp_path / "mine" / "fish.wav", talk(8.0, 2).audio, 16000)
     write_bvh(tmp_path / "mine" / "fish.bvh", motion)
     corpus, run, out = (str(tmp_path / name) for name in ("corpus", "run", "out"))
-    assert main(["prepare", "folder", str(tmp_path / "mine"), "--out", corpus, "--fps", "23.976"]) == 0
+    assert (
+        main(["prepare", "folder", str(tmp_path / "mine"), "--out", corpus, "--fps", "23.976", "--joints", "all"]) == 0
+    )
     shown = capsys.readouterr()
     assert "training on all 3 joints of the rig" in shown.err
     assert "3 joints at 23.976 fps" in shown.out

@@ -8,14 +8,15 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int16
 
+from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.representation import WIDTHS, rotations_from_rows
 from a2g_jax.data.splits import Segment, Splits
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import read_json
 
@@ -25,8 +26,10 @@ VERSION, VERSION_ON_DEMAND = 1, 2
 MANIFEST = "manifest.json"
 #: In a corpus of the second kind: what to generate, part by part.
 PARTS = "parts.json"
-#: The arrays of a corpus, all recordings one after the other: log-mel (N, bands), 6D rotations (N, J, 6), root (N, 3).
+#: The arrays of a corpus, all recordings one after the other: log-mel (N, width), poses (N, R, D), root (N, 3).
 ARRAYS = ("audio.npy", "pose.npy", "root.npy")
+#: The audio itself, where it is kept: 16-bit samples, as many for each recording as its frames last.
+WAVEFORM = "waveform.npy"
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,12 @@ class Entry:
     emotion: str
     sources: dict[str, str]
     """SHA-256 of each file it was read from."""
+    split: str = ""
+    """Part that the data set's authors put it into, if they did."""
+    first_sample: int = 0
+    """Where its samples begin in the waveform."""
+    samples: int = 0
+    """How many there are; 0 where the corpus keeps none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +59,10 @@ class Corpus:
     path: Path
     fps: float
     mel: MelConfig
-    skeleton: Skeleton
+    body: Skeleton | PoseLayout
+    """What the rows of a pose are: joints of a skeleton, or points and bones."""
+    representation: str
+    """How a pose is written down: a key of :data:`~a2g_jax.data.representation.WIDTHS`."""
     recordings: tuple[Entry, ...]
     splits: Splits
     recipe: dict[str, Any]
@@ -83,7 +95,8 @@ class Corpus:
                 path=path,
                 fps=float(manifest["fps"]),
                 mel=MelConfig(**manifest["mel"]),
-                skeleton=skeleton_from_json(manifest["skeleton"]),
+                body=body_from_json(manifest),
+                representation=manifest.get("pose", "6d"),
                 recordings=tuple(Entry(**entry) for entry in manifest["recordings"]),
                 splits={name: [Segment(*row) for row in rows] for name, rows in manifest["splits"].items()},
                 recipe=manifest["recipe"],
@@ -104,18 +117,25 @@ class Corpus:
             for index, start, stop in segments:
                 if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
                     raise InputError(f"{where}: is damaged ({name} holds {[index, start, stop]}); prepare it anew.")
-        shapes = {"audio": (self.mel.bands,), "pose": (self.skeleton.joints, 6), "root": (3,)}
+        if self.representation not in WIDTHS:
+            raise InputError(f"{where}: tells of poses as {self.representation!r}, which this package does not know.")
+        shapes = {"audio": (self.mel.width,), "pose": (self.rows, WIDTHS[self.representation]), "root": (3,)}
         for name, statistics in self.statistics.items():
             if not statistics.mean.shape == statistics.std.shape == shapes[name] or not np.all(statistics.std > 0):
                 raise InputError(f"{self.path / 'statistics.npz'}: is damaged ({name}); prepare the corpus anew.")
         if self.on_demand:
             self._check_parts()
-        frames, joints = self.frames, self.skeleton.joints
-        for name, shape in zip(ARRAYS, ((frames, self.mel.bands), (frames, joints, 6), (frames, 3)), strict=True):
+        expected: dict[str, tuple[Any, tuple[int, ...]]] = {
+            f"{name}.npy": (np.float32, (self.frames, *shape)) for name, shape in shapes.items()
+        }
+        if samples := sum(entry.samples for entry in self.recordings):
+            expected[WAVEFORM] = (np.int16, (samples,))
+        for name, (kind, shape) in expected.items():
             array = self._array(name)
-            if array.shape != shape or array.dtype != np.float32:
+            if array.shape != shape or array.dtype != kind:
                 raise InputError(
-                    f"{self.path / name}: expected float32 {shape}; got {array.dtype} {array.shape}; prepare anew."
+                    f"{self.path / name}: expected {np.dtype(kind)} {shape}; got {array.dtype} {array.shape}; prepare"
+                    " anew."
                 )
 
     def _check_parts(self) -> None:
@@ -135,6 +155,39 @@ class Corpus:
         return read_json(self.path / PARTS) if self.on_demand else {}
 
     @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton whose rotations the corpus holds.
+
+        Raises:
+            InputError: it holds keypoints or directions.
+        """
+        if not isinstance(self.body, Skeleton):
+            raise InputError(
+                f"{self.path}: holds {self.representation} and no skeleton; this needs a corpus of rotations"
+                " (prepared with --pose 6d or exponential)."
+            )
+        return self.body
+
+    def require_pose(self, *representations: str) -> None:
+        """Refuse to be read as what it is not.
+
+        Raises:
+            InputError: the corpus holds poses in none of the representations.
+        """
+        if self.representation not in representations:
+            raise InputError(
+                f"{self.path}: holds poses as {self.representation}; this needs {' or '.join(representations)}."
+                f" Prepare one with --pose {representations[0]}."
+            )
+
+    @property
+    def rows(self) -> int:
+        """Rows of a pose: joints, bones or points."""
+        if isinstance(self.body, Skeleton):
+            return self.body.joints
+        return len(self.body.names if self.representation == "keypoints" else self.body.bones)
+
+    @property
     def parts(self) -> int:
         """Parts that training takes in turns: the stored recordings, and those that are generated."""
         return 1 + len(self.later.get("parts", ()))
@@ -145,13 +198,13 @@ class Corpus:
         return sum(entry.frames for entry in self.recordings)
 
     @cached_property
-    def audio(self) -> Float[np.ndarray, "N bands"]:
+    def audio(self) -> Float[np.ndarray, "N width"]:
         """Log-mel energies in dB."""
         return self._array("audio.npy")
 
     @cached_property
-    def pose(self) -> Float[np.ndarray, "N J 6"]:
-        """Local rotations, first two columns of each matrix."""
+    def pose(self) -> Float[np.ndarray, "N R D"]:
+        """Poses, written down as :attr:`representation` says; in 6D the first two columns of each local rotation."""
         return self._array("pose.npy")
 
     @cached_property
@@ -160,8 +213,19 @@ class Corpus:
         return self._array("root.npy")
 
     @cached_property
+    def waveform(self) -> Int16[np.ndarray, " samples"]:
+        """The audio itself, at ``mel.sample_rate``.
+
+        Raises:
+            InputError: the corpus does not keep it.
+        """
+        if not any(entry.samples for entry in self.recordings):
+            raise InputError(f"{self.path}: keeps no waveforms; prepare it with --waveform.")
+        return self._array(WAVEFORM)
+
+    @cached_property
     def statistics(self) -> dict[str, Statistics]:
-        """``audio`` (bands,), ``pose`` (J, 6) and ``root`` (3,), over the training split only."""
+        """``audio`` (width,), ``pose`` (R, D) and ``root`` (3,), over the training split only."""
         path = self.path / "statistics.npz"
         try:
             with np.load(path, allow_pickle=False) as arrays:
@@ -187,8 +251,13 @@ class Corpus:
         ]
 
     def motion(self, start: int, stop: int) -> Motion:
-        """The motion in rows ``start`` to ``stop`` of the arrays."""
-        rotations = np.asarray(matrix_from_6d(np.asarray(self.pose[start:stop])))
+        """The motion in rows ``start`` to ``stop`` of the arrays.
+
+        Raises:
+            InputError: the corpus holds no rotations.
+        """
+        self.require_pose("6d", "exponential")
+        rotations = rotations_from_rows(np.asarray(self.pose[start:stop]), self.representation)
         return Motion(rotations, np.asarray(self.root[start:stop]), self.skeleton, self.fps)
 
     def annotations(self, recording: int) -> dict[str, Any]:
@@ -216,6 +285,20 @@ def skeleton_from_json(value: dict[str, Any]) -> Skeleton:
     )
 
 
-def mel_to_json(mel: MelConfig) -> dict[str, Any]:
-    """Settings of the audio features as JSON values."""
-    return asdict(mel)
+def body_to_json(body: Skeleton | PoseLayout) -> dict[str, Any]:
+    """What the rows of a pose are, as an entry of a manifest."""
+    if isinstance(body, Skeleton):
+        return {"skeleton": skeleton_to_json(body)}
+    return {"layout": asdict(body)}
+
+
+def body_from_json(manifest: dict[str, Any]) -> Skeleton | PoseLayout:
+    """Inverse of :func:`body_to_json`."""
+    if "skeleton" in manifest:
+        return skeleton_from_json(manifest["skeleton"])
+    layout = manifest["layout"]
+    return PoseLayout(
+        names=tuple(layout["names"]),
+        bones=tuple((int(start), int(end)) for start, end in layout["bones"]),
+        lengths=tuple(float(length) for length in layout["lengths"]),
+    )

@@ -6,12 +6,13 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from a2g_jax.data.rows import Prepared, prepare_recording
+from a2g_jax.data.settings import Features
 from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.data.talker.recordings import cast, talk
 from a2g_jax.data.talker.speakers import SPEAKERS
 from a2g_jax.data.talker.views.capture import add_jitter
+from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import MelConfig
 
 #: Arguments of :func:`~a2g_jax.data.talker.recordings.talk` for one recording.
 Role: TypeAlias = dict[str, Any]
@@ -35,8 +36,11 @@ class TalkerOptions:
     """Degrees of capture noise: see :func:`~a2g_jax.data.talker.views.capture.add_jitter`."""
     fingers: bool = False
     """The 52 joints with fingers instead of the 22 of the body."""
+    view: str = "body"
+    """As which data set shows its speakers: see :data:`~a2g_jax.data.talker.views.catalogue.VIEWS`."""
 
     def __post_init__(self) -> None:
+        find_view(self.view)
         for flag, names, known in (
             ("speakers", self.speakers, SPEAKERS),
             ("emotions", self.emotions, VOICE_EMOTIONS),
@@ -63,10 +67,11 @@ class TalkerOptions:
         return cast(self.minutes, self.seed, self.speakers, self.emotions)
 
 
-def generate_rows(role: Role, fps: float, jitter: float, fingers: bool, mel: MelConfig) -> Prepared:
+def generate_rows(role: Role, jitter: float, fingers: bool, view: str, features: Features) -> Prepared:
     """One generated recording as rows."""
-    recording = talk(**role, fps=fps, sample_rate=mel.sample_rate, fingers=fingers)
+    seen = find_view(view)
+    recording = talk(**role, fps=features.fps, sample_rate=features.mel.sample_rate, fingers=fingers or seen.fingers)
     if jitter > 0.0:
         rng = np.random.default_rng([role["seed"], _JITTER])
         recording = replace(recording, motion=add_jitter(recording.motion, jitter, rng))
-    return prepare_recording(recording, fps, mel, "all" if fingers else "body")
+    return prepare_recording(seen.look(recording, features.fps), replace(features, joints="all"))

@@ -20,10 +20,10 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import PARTS, Corpus
 from a2g_jax.data.generated import Role, TalkerOptions, generate_rows
+from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
 from a2g_jax.data.workers import worker_pool
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import MelConfig
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class OnDemand:
 class Part(NamedTuple):
     """Recordings to train on for a while."""
 
-    audio: Float[np.ndarray, "N bands"]
-    pose: Float[np.ndarray, "N J 6"]
+    audio: Float[np.ndarray, "N width"]
+    pose: Float[np.ndarray, "N R D"]
     segments: list[Segment]
     """Stretches within which clips may lie, as rows of the arrays."""
 
@@ -65,7 +65,7 @@ def split_roles(options: TalkerOptions, roles: list[Role], settings: OnDemand) -
     count = -(-len(rest) // max(1, round(settings.part_minutes / each)))
     bounds = [round(number * len(rest) / count) for number in range(count + 1)]
     return {
-        "options": {"jitter": options.jitter, "fingers": options.fingers},
+        "options": {"jitter": options.jitter, "fingers": options.fingers, "view": options.view},
         "stored": roles[:stored],
         "parts": [rest[start:stop] for start, stop in zip(bounds, bounds[1:], strict=False)],
     }
@@ -177,18 +177,18 @@ def _settings(corpus: Corpus) -> dict[str, Any]:
     try:
         options = corpus.later["options"]
         return {
-            "fps": corpus.fps,
             "jitter": float(options["jitter"]),
             "fingers": bool(options["fingers"]),
-            "mel": corpus.mel,
+            "view": str(options.get("view", "body")),
+            "features": Features(corpus.fps, corpus.mel, corpus.representation, "all"),
         }
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{corpus.path / PARTS}: is damaged ({error!r}); prepare the corpus anew.") from None
 
 
 def _generate(
-    role: Role, fps: float, jitter: float, fingers: bool, mel: MelConfig
-) -> tuple[Float[np.ndarray, "T bands"], Float[np.ndarray, "T J 6"]]:
+    role: Role, jitter: float, fingers: bool, view: str, features: Features
+) -> tuple[Float[np.ndarray, "T width"], Float[np.ndarray, "T R D"]]:
     """Audio and pose rows of a recording; what training does not need stays in the worker."""
-    rows = generate_rows(role, fps, jitter, fingers, mel)
+    rows = generate_rows(role, jitter, fingers, view, features)
     return rows.audio, rows.pose

@@ -20,18 +20,19 @@ from a2g_jax.data.corpus import (
     PARTS,
     VERSION,
     VERSION_ON_DEMAND,
+    WAVEFORM,
     Corpus,
     Entry,
-    mel_to_json,
-    skeleton_to_json,
+    body_to_json,
 )
 from a2g_jax.data.lock import HeldError, hold
 from a2g_jax.data.rows import Prepared as Prepared
+from a2g_jax.data.rows import Skipped as Skipped
 from a2g_jax.data.rows import prepare_recording as prepare_recording
-from a2g_jax.data.splits import Splits, split_recordings
+from a2g_jax.data.settings import Features
+from a2g_jax.data.splits import Splits, official_splits
 from a2g_jax.data.unfinished import Unfinished
 from a2g_jax.errors import InputError, Interrupted
-from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import RunningStatistics
 from a2g_jax.io.files import make_folder, read_json, sha256_file, write_json
 
@@ -40,7 +41,7 @@ _FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
 #: Rows read at once when statistics are taken.
 _ROWS = 65536
 #: Of the layout of unfinished work; work of another one is started over.
-_LAYOUT = 1
+_LAYOUT = 2
 _RECIPE = "recipe.json"
 
 
@@ -56,20 +57,23 @@ class Item(NamedTuple):
 class Plan:
     """What a corpus is to be."""
 
-    fps: float
-    mel: MelConfig
+    features: Features
     recipe: dict[str, Any]
     """How the recordings are made; kept in the manifest."""
     seed: int = 0
     """Of the split."""
     parts: dict[str, Any] = field(default_factory=dict)
     """Training recordings to be generated during training, as :mod:`a2g_jax.data.on_demand` knows them; or nothing."""
+    official: bool = True
+    """Whether recordings go into the parts that a data set's authors chose, where they did."""
+    skip_broken: bool = False
+    """Whether a recording that cannot be prepared is noted and left out instead of ending the work."""
 
 
 def prepare_corpus(
     path: str | os.PathLike[str],
     items: Sequence[Item],
-    make: Callable[[int], Generator[Prepared, None, None]],
+    make: Callable[[int], Generator[Prepared | Skipped, None, None]],
     plan: Plan,
     report: Callable[[str], None] = lambda line: None,
 ) -> Corpus:
@@ -91,7 +95,7 @@ def prepare_corpus(
     path = Path(path)
     with _place(path) as folder:
         _start_over_unless_same(folder, path, plan, report)
-        work = Unfinished(folder, plan.mel.bands)
+        work = Unfinished(folder, plan.features)
         total = len(items)
         try:
             done, before = work.recover(list(items))
@@ -100,31 +104,42 @@ def prepare_corpus(
                 report(f"{path}: going on after {done} of {total} recordings{again}")
             with closing(make(done)) as rows:
                 for item in rows:
-                    work.append(item)
+                    _take_in(work, item, plan.skip_broken, report)
             _finish(work, path, plan, report)
         except KeyboardInterrupt:
             raise Interrupted(
-                f"{path}: stopped after {len(work.entries)} of {total} recordings; the same command goes on from there."
+                f"{path}: stopped after {work.done} of {total} recordings; the same command goes on from there."
             ) from None
         except Exception:
-            if work.entries:
-                report(
-                    f"{path}: {len(work.entries)} of {total} recordings are done; the same command goes on from there"
-                )
+            if work.done:
+                report(f"{path}: {work.done} of {total} recordings are done; the same command goes on from there")
             raise
         finally:
             work.close()
-            if not work.entries:
+            if not work.done:
                 shutil.rmtree(folder, ignore_errors=True)
     return Corpus.open(path)
+
+
+def _take_in(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
+    """Add a recording, or note why it cannot be added."""
+    if isinstance(item, Prepared):
+        try:
+            work.append(item)
+            return
+        except InputError as error:
+            if not skip:
+                raise
+            item = Skipped(item.name, item.sources, str(error))
+    report(f"skipped: {item.reason}")
+    work.skip(item)
 
 
 def write_corpus(
     path: str | os.PathLike[str],
     prepared: Iterable[Prepared],
     *,
-    fps: float,
-    mel: MelConfig,
+    features: Features,
     recipe: dict[str, Any],
     seed: int = 0,
     report: Callable[[str], None] = lambda line: None,
@@ -142,12 +157,12 @@ def write_corpus(
     path = Path(path)
     with _place(path) as folder:
         shutil.rmtree(folder, ignore_errors=True)
-        work = Unfinished(folder, mel.bands)
+        work = Unfinished(folder, features)
         try:
             work.recover([])
             for item in prepared:
                 work.append(item)
-            _finish(work, path, Plan(fps, mel, recipe, seed), report)
+            _finish(work, path, Plan(features, recipe, seed), report)
         finally:
             work.close()
             shutil.rmtree(folder, ignore_errors=True)
@@ -180,8 +195,9 @@ def _place(path: Path) -> Iterator[Path]:
 
 def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
     """Remove unfinished work of another recipe, and write down this one."""
-    about = {"fps": plan.fps, "mel": mel_to_json(plan.mel), "package": __version__, "layout": _LAYOUT}
-    now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, "parts": plan.parts}))
+    about = {**plan.features.to_json(), "package": __version__, "layout": _LAYOUT}
+    rest = {"parts": plan.parts, "official splits": plan.official, "skip broken": plan.skip_broken}
+    now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
     if folder.is_dir():
         try:
             before = read_json(folder / _RECIPE)
@@ -203,18 +219,22 @@ def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callab
 
 def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
     """Everything but the rows; then the corpus gets its name."""
-    entries, skeleton, folder = work.entries, work.skeleton, work.corpus
-    if skeleton is None:
-        raise InputError("no recordings to prepare; check the source.")
+    entries, body, folder, features = work.entries, work.body, work.corpus, plan.features
+    if body is None:
+        reason = f" the first of {work.done}: {work.skipped[0].reason}" if work.skipped else ""
+        raise InputError(f"no recordings to prepare; check the source.{reason}")
     if work.spread > 0.001:
         report(
             f"bone lengths differ between recordings by up to {work.spread * 100:.1f} cm;"
             f" rotations are kept, positions use those of {entries[0].name}"
         )
     work.finish_arrays()
-    splits = split_recordings([entry.frames for entry in entries], plan.seed)
+    parts = [entry.split if plan.official else "" for entry in entries]
+    splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
+    if not splits["train"]:
+        raise InputError(f"{path}: no recording is for training (parts: {', '.join(sorted(set(parts)))}); split anew.")
     _write_statistics(folder, entries, splits)
-    files = [*ARRAYS, "statistics.npz"]
+    files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
     if plan.parts:
         write_json(folder / PARTS, plan.parts)
         files.append(PARTS)
@@ -225,13 +245,13 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
         "package": __version__,
         "fingerprint": hashlib.sha256("".join(hashes.values()).encode()).hexdigest(),
         "recipe": plan.recipe,
-        "fps": plan.fps,
-        "mel": mel_to_json(plan.mel),
-        "seconds": work.frames / plan.fps,
-        "skeleton": skeleton_to_json(skeleton),
+        **features.to_json(),
+        "seconds": work.frames / features.fps,
+        **body_to_json(body),
         "recordings": [asdict(entry) for entry in entries],
         "splits": {name: [list(segment) for segment in segments] for name, segments in splits.items()},
         "arrays": hashes,
+        "skipped": [asdict(item) for item in work.skipped],
     }
     write_json(folder / MANIFEST, manifest)
     folder.replace(path)

@@ -1,5 +1,6 @@
 """Which stretches of which recordings are for training, validation and testing."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -49,3 +50,29 @@ def split_recordings(frames: list[int], seed: int, shares: tuple[float, float, f
         name: [Segment(int(index), 0, frames[index]) for index in indices]
         for name, indices in (("train", train), ("validation", validation), ("test", test))
     }
+
+
+def official_splits(frames: list[int], parts: Sequence[str], seed: int) -> Splits:
+    """The parts that a data set's authors chose, completed where they chose none.
+
+    Recordings without a part train. Where nobody is named for validation a tenth of the training recordings is taken
+    for it, by the seed (in time, as :func:`split_recordings` does it, where there are fewer than five); a data set that
+    names no part at all is dealt out by :func:`split_recordings`.
+
+    Args:
+        frames: length of every recording.
+        parts: ``"train"``, ``"validation"``, ``"test"`` or an empty text for each recording.
+    """
+    if not any(parts):
+        return split_recordings(frames, seed)
+    splits: Splits = {"train": [], "validation": [], "test": []}
+    for index, (count, part) in enumerate(zip(frames, parts, strict=True)):
+        splits[part or "train"].append(Segment(index, 0, count))
+    if not splits["validation"] and splits["train"]:
+        train = [segment.recording for segment in splits["train"]]
+        drawn = split_recordings([frames[index] for index in train], seed, (0.9, 0.1, 0.0))
+        # With five recordings or more at least one would be put into each part: that of the test goes back.
+        drawn["train"] = sorted(drawn["train"] + drawn.pop("test"))
+        for name, segments in drawn.items():
+            splits[name] = [Segment(train[number], start, stop) for number, start, stop in segments]
+    return splits

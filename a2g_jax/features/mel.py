@@ -25,14 +25,28 @@ class MelConfig:
     """Level that active speech is brought to, in dB relative to full scale; None leaves the audio as it is."""
     range_db: float = 60.0
     """Bands quieter than the loudest one by more than this are raised to that floor (librosa's ``top_db``)."""
+    low_hz: float = 0.0
+    """Where the lowest band begins."""
+    high_hz: float | None = None
+    """Where the highest band ends; None is half the sample rate."""
+    stack: int = 1
+    """Spectra for each motion frame, evenly spaced from its time on, side by side in one row."""
+
+    @property
+    def width(self) -> int:
+        """Values in a row."""
+        return self.bands * self.stack
 
 
 @lru_cache(maxsize=8)
-def mel_filters(sample_rate: int, window: int, bands: int) -> Float[np.ndarray, "bands bins"]:
+def mel_filters(
+    sample_rate: int, window: int, bands: int, low_hz: float = 0.0, high_hz: float | None = None
+) -> Float[np.ndarray, "bands bins"]:
     """Triangular mel filters on the bins of a Fourier transform of ``window`` samples."""
     import librosa  # late: it costs seconds
 
-    return librosa.filters.mel(sr=sample_rate, n_fft=window, n_mels=bands).astype(np.float32)
+    filters = librosa.filters.mel(sr=sample_rate, n_fft=window, n_mels=bands, fmin=low_hz, fmax=high_hz)
+    return filters.astype(np.float32)
 
 
 def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
@@ -56,8 +70,8 @@ def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
 
 def log_mel(
     audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
-) -> Float[np.ndarray, "frames bands"]:
-    """Log-mel energies in dB, one row for each motion frame.
+) -> Float[np.ndarray, "frames width"]:
+    """Log-mel energies in dB, one row for each motion frame (with ``config.stack`` spectra in it).
 
     The window of frame k is centred on time ``k / fps``, rounded to the nearest sample each time on its own, so the
     features never drift from the motion; a fixed integer hop would (0.1 s in 166 s at 30 fps and 16 kHz). Beyond the
@@ -67,6 +81,13 @@ def log_mel(
         audio: mono samples at ``config.sample_rate``.
         frames: number of rows; motion of the same length has ``round(seconds * fps)``.
     """
+    rows = _log_mel_rows(audio, config, fps * config.stack, frames * config.stack)
+    return rows.reshape(frames, config.width)
+
+
+def _log_mel_rows(
+    audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
+) -> Float[np.ndarray, "frames bands"]:
     audio = np.asarray(audio, dtype=np.float32)
     if config.level_db is not None:
         gain = 10 ** ((config.level_db - active_level_db(audio, config.sample_rate)) / 20)
@@ -77,7 +98,7 @@ def log_mel(
     padded = np.pad(audio, (half, after))
     windows = np.lib.stride_tricks.sliding_window_view(padded, config.window)
     hann = signal.get_window("hann", config.window).astype(np.float32)
-    filters = mel_filters(config.sample_rate, config.window, config.bands).T
+    filters = mel_filters(config.sample_rate, config.window, config.bands, config.low_hz, config.high_hz).T
     rows = np.empty((frames, config.bands), np.float32)
     for start in range(0, frames, _CHUNK):
         some = windows[centres[start : start + _CHUNK]] * hann

@@ -82,6 +82,9 @@ def corpus_request(
     corpus = Corpus.open(path)
     if corpus.recipe.get("reader") != "talker":
         raise InputError(f"{path}: was not generated, so its truth is unknown; name a corpus of 'a2g prepare talker'.")
+    if corpus.recipe.get("view", "body") != "body":
+        raise InputError(f"{path}: shows its speakers as {corpus.recipe['view']}; prepare one without --view.")
+    corpus.require_pose("6d")
     entry = _entry(corpus, name)
     roles = [*corpus.recipe.get("roles", ()), *corpus.later.get("stored", ())]
     role = next((role for role in roles if role["name"] == entry.name), None)

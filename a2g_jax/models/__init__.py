@@ -14,6 +14,8 @@ class Entry(NamedTuple):
     config_class: type
     presets: Mapping[str, Any]
     build: Callable[[Any, Data], Model]
+    poses: tuple[str, ...] = ("6d",)
+    """Representations of poses that it takes."""
 
 
 MODELS: dict[str, Entry] = {

@@ -45,7 +45,12 @@ class RunConfig:
 
     @classmethod
     def of(cls, model: str, preset: str, model_config: Any, train_config: TrainConfig, corpus: Corpus) -> "RunConfig":
-        """The run of a model on a corpus."""
+        """The run of a model on a corpus.
+
+        Raises:
+            InputError: the model does not take such poses.
+        """
+        corpus.require_pose(*find_model(model).poses)
         about = {
             "fingerprint": corpus.fingerprint,
             "recipe": corpus.recipe,
@@ -57,7 +62,7 @@ class RunConfig:
 
     def build(self) -> Model:
         """The model's functions."""
-        data = Data(self.skeleton, self.fps, self.mel.bands, self.statistics["pose"])
+        data = Data(self.skeleton, self.fps, self.mel.width, self.statistics["pose"])
         return find_model(self.model).build(self.model_config, data)
 
 

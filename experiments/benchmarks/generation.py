@@ -101,7 +101,7 @@ def _ours(config: Any, options: argparse.Namespace) -> dict[str, Any]:
         "specific_std": rng.uniform(0.5, 1.5, (SUMMARY_CLIPS, code)).astype(np.float32),
     }
     generator = Generator(Run(config, config.build().init(jax.random.key(options.seed)), summary, 0))
-    features = _features(options, config.mel.bands)
+    features = _features(options, config.mel.width)
     audio = rng.normal(0, 0.1, round(options.frames / config.fps * config.mel.sample_rate)).astype(np.float32)
 
     def positions(samples: int) -> None:
@@ -121,8 +121,8 @@ def _twin(config: Any, options: argparse.Namespace) -> dict[str, Any]:
 
     torch.set_num_threads(measure.THREADS)
     torch.manual_seed(options.seed)
-    twin = Twin(config.model_config, config.skeleton, config.mel.bands).eval()
-    features = torch.from_numpy(_features(options, config.mel.bands))
+    twin = Twin(config.model_config, config.skeleton, config.mel.width).eval()
+    features = torch.from_numpy(_features(options, config.mel.width))
     code = config.model_config.code_channels
     means, stds = torch.randn(SUMMARY_CLIPS, code), torch.rand(SUMMARY_CLIPS, code) + 0.5
 

@@ -102,7 +102,7 @@ def _twin(config: Any, corpus: Any, options: argparse.Namespace) -> dict[str, An
     torch.set_num_threads(measure.THREADS)
     torch.manual_seed(options.seed)
     settings = config.model_config
-    twin = Twin(settings, corpus.skeleton, corpus.mel.bands)
+    twin = Twin(settings, corpus.skeleton, corpus.mel.width)
     adam = torch.optim.Adam(twin.parameters(), lr=config.train_config.learning_rate, fused=True)
     audio, pose = torch.from_numpy(np.array(corpus.audio)), torch.from_numpy(np.array(corpus.pose))
     statistics = config.statistics["audio"]

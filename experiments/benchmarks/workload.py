@@ -40,7 +40,7 @@ def make_corpus(folder: Path, frames: int, joints: int, seed: int) -> Corpus:
     skeleton, mel = make_skeleton(joints, seed), MelConfig()
     walk = np.cumsum(rng.normal(0, 0.02, (frames, joints, 6)), axis=0)
     pose = np.sin(walk).astype(np.float32) * 0.5 + np.eye(3, dtype=np.float32)[:2].reshape(6)
-    audio = rng.normal(-40, 10, (frames, mel.bands)).astype(np.float32)
+    audio = rng.normal(-40, 10, (frames, mel.width)).astype(np.float32)
     root = np.zeros((frames, 3), np.float32)
     arrays = {"audio": audio, "pose": pose, "root": root}
     statistics = {}

@@ -10,13 +10,14 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.folder import find_pairs, read_pair
 from a2g_jax.data.prepare import prepare_recording, write_corpus
 from a2g_jax.data.recording import Recording
+from a2g_jax.data.settings import Features
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import MelConfig, log_mel
+from a2g_jax.features.mel import log_mel
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 
-MEL = MelConfig()
+FEATURES = Features(joints="all")
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def test_rows_are_the_recordings(toy_corpus):
     entry = toy_corpus.recordings[2]
     assert (entry.name, entry.frames, entry.speaker) == ("take2", 300, take.speaker)
     rows = slice(entry.first, entry.first + entry.frames)
-    np.testing.assert_array_equal(toy_corpus.audio[rows], log_mel(take.audio, MEL, 30.0, 300))
+    np.testing.assert_array_equal(toy_corpus.audio[rows], log_mel(take.audio, FEATURES.mel, 30.0, 300))
     again = toy_corpus.motion(rows.start, rows.stop)
     np.testing.assert_allclose(again.positions(), take.motion.positions(), atol=1e-5)
     assert toy_corpus.annotations(2)["words"][0]["text"] == take.words[0].text
@@ -60,19 +61,19 @@ def test_splits_do_not_share_recordings(toy_corpus):
 
 def test_an_error_leaves_nothing_behind(tmp_path, take):
     def rows():
-        yield prepare_recording(take, 30.0, MEL)
+        yield prepare_recording(take, FEATURES)
         raise InputError("take7.bvh: is broken")
 
     with pytest.raises(InputError, match="take7"):
-        write_corpus(tmp_path / "corpus", rows(), fps=30.0, mel=MEL, recipe={})
+        write_corpus(tmp_path / "corpus", rows(), features=FEATURES, recipe={})
     assert list(tmp_path.iterdir()) == []
 
 
 def test_existing_folders_and_empty_sources_are_refused(tmp_path):
     with pytest.raises(InputError, match="exists already"):
-        write_corpus(tmp_path, iter(()), fps=30.0, mel=MEL, recipe={})
+        write_corpus(tmp_path, iter(()), features=FEATURES, recipe={})
     with pytest.raises(InputError, match="no recordings"):
-        write_corpus(tmp_path / "corpus", iter(()), fps=30.0, mel=MEL, recipe={})
+        write_corpus(tmp_path / "corpus", iter(()), features=FEATURES, recipe={})
 
 
 def test_audio_and_motion_of_different_takes_are_refused(take):
@@ -80,7 +81,7 @@ def test_audio_and_motion_of_different_takes_are_refused(take):
         name=take.name, audio=np.tile(take.audio, 2), sample_rate=16000, motion=take.motion, sources=("a.wav", "a.bvh")
     )
     with pytest.raises(InputError, match=r"a\.wav and a\.bvh: audio lasts 8\.00 s and motion 4\.00 s"):
-        prepare_recording(longer, 30.0, MEL)
+        prepare_recording(longer, FEATURES)
 
 
 def test_recordings_of_another_rig_are_refused(tmp_path, take):
@@ -92,16 +93,15 @@ def test_recordings_of_another_rig_are_refused(tmp_path, take):
     with pytest.raises(InputError, match=r"arms: has other joints \(4 of them\) than the recordings before it \(22\)"):
         write_corpus(
             tmp_path / "corpus",
-            [prepare_recording(take, 30.0, MEL), prepare_recording(arms, 30.0, MEL)],
-            fps=30.0,
-            mel=MEL,
+            [prepare_recording(take, FEATURES), prepare_recording(arms, FEATURES)],
+            features=FEATURES,
             recipe={},
         )
 
 
 @pytest.mark.parametrize("fps", [15.0, 25.0, 60.0])
 def test_other_frame_rates(take, fps):
-    prepared = prepare_recording(take, fps, MEL)
+    prepared = prepare_recording(take, Features(fps=fps))
     assert len(prepared.audio) == len(prepared.pose) == round(4.0 * fps)
 
 
@@ -152,9 +152,9 @@ def test_a_folder_of_pairs(tmp_path, take):
     assert [audio.name for audio, _ in pairs] == ["a.wav", "b.wav"]
     recording = read_pair(*pairs[0], 16000)
     assert recording.motion.skeleton.joints == 22
-    prepared = prepare_recording(recording, 30.0, MEL)
+    prepared = prepare_recording(recording, Features())
     # BVH lists joints depth first; the body is found by name and comes in the standard order.
-    assert prepared.skeleton.names == take.motion.skeleton.names
+    assert prepared.body.names == take.motion.skeleton.names
     (source / "b.bvh").unlink()
     with pytest.raises(InputError, match=r"b\.wav: has no BVH file of the same name"):
         find_pairs(source)
@@ -186,10 +186,10 @@ def test_parallel_trees_pair_by_path(tmp_path, take):
 def test_real_takes(shared, name, frames):
     ((audio, bvh),) = find_pairs(shared / name)
     recording = read_pair(audio, bvh, 16000)
-    prepared = prepare_recording(recording, 30.0, MEL)
+    prepared = prepare_recording(recording, Features())
     assert prepared.pose.shape == (frames, 22, 6)
     assert prepared.audio.shape == (frames, 64)
-    everything = prepare_recording(recording, 30.0, MEL, joints="all")
+    everything = prepare_recording(recording, Features(joints="all"))
     assert everything.pose.shape == (frames, 75, 6)
     if name == "beat":
         assert len(recording.words) == 199

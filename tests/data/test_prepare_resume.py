@@ -13,9 +13,10 @@ import pytest
 
 from a2g_jax.data.corpus import ARRAYS, Corpus
 from a2g_jax.data.lock import HeldError, hold
-from a2g_jax.data.make import prepare_folder
+from a2g_jax.data.make import prepare_data_set
 from a2g_jax.data.prepare import Item, Plan, prepare_corpus
 from a2g_jax.data.rows import Prepared
+from a2g_jax.data.settings import Features
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.features.mel import MelConfig
@@ -26,7 +27,7 @@ from a2g_jax.io.bvh import write_bvh
 MEL = MelConfig()
 COUNT = 8
 ITEMS = [Item(f"r{number}", ()) for number in range(COUNT)]
-PLAN = Plan(30.0, MEL, {"reader": "noise", "speed": 1.0})
+PLAN = Plan(Features(), {"reader": "noise", "speed": 1.0})
 
 
 def noise(number: int) -> Prepared:
@@ -39,7 +40,9 @@ def noise(number: int) -> Prepared:
         audio=rng.normal(size=(frames, MEL.bands)).astype(np.float32),
         pose=rng.normal(size=(frames, 2, 6)).astype(np.float32),
         root=rng.normal(size=(frames, 3)).astype(np.float32),
-        skeleton=Skeleton(offsets, ("hip", "head"), (-1, 0)),
+        waveform=None,
+        body=Skeleton(offsets, ("hip", "head"), (-1, 0)),
+        split="",
         speaker="nobody",
         emotion="none",
         sources=(),
@@ -143,7 +146,7 @@ def test_a_damaged_journal_costs_only_what_it_does_not_tell(tmp_path, whole):
 def test_other_settings_start_over_and_say_so(tmp_path, whole):
     stop_after(tmp_path / "corpus", 3)
     said = []
-    other = Plan(30.0, MEL, {"reader": "noise", "speed": 2.0})
+    other = Plan(Features(), {"reader": "noise", "speed": 2.0})
     corpus = prepare_corpus(tmp_path / "corpus", ITEMS, make, other, said.append)
     assert "unfinished work with other settings (speed: 1.0, now 2.0) was there; starting over" in said[0]
     assert corpus.recipe["speed"] == 2.0
@@ -199,13 +202,13 @@ def test_files_that_changed_are_read_again(tmp_path, capsys):
     text = whole.read_text()
     whole.write_text("HIERARCHY\n")
     with pytest.raises(InputError, match=r"2\.bvh"):
-        prepare_folder(source, tmp_path / "corpus", 0, 30.0, "body")
+        prepare_data_set("folder", source, tmp_path / "corpus", Features())
     assert "2 of 3 recordings are done" in capsys.readouterr().err
     whole.write_text(text)
     write_audio(source / "1.wav", takes[1].audio * 0.5, 16000)
-    corpus = prepare_folder(source, tmp_path / "corpus", 0, 30.0, "body")
+    corpus = prepare_data_set("folder", source, tmp_path / "corpus", Features())
     assert "going on after 1 of 3 recordings (1 of those done have changed" in capsys.readouterr().err
-    again = prepare_folder(source, tmp_path / "again", 0, 30.0, "body")
+    again = prepare_data_set("folder", source, tmp_path / "again", Features())
     assert contents(corpus.path) == contents(again.path)
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.prepare import prepare_recording
+from a2g_jax.data.settings import Features
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.data.talker.views import directions as ted
 from a2g_jax.data.talker.views import upper_body as beat
@@ -14,7 +15,6 @@ from a2g_jax.data.talker.views.capture import add_jitter, joint_weights
 from a2g_jax.data.talker.views.keypoints import KEYPOINTS, Camera, Detector, keypoints, write_s2g_windows
 from a2g_jax.data.talker.views.landmarks import landmarks
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import MelConfig
 from a2g_jax.geometry.motion import resample
 from a2g_jax.io.bvh import read_bvh, write_bvh
 
@@ -120,7 +120,7 @@ def test_order_is_that_of_beat(shared):
 
 def test_upper_body_becomes_a_corpus_and_a_file(take, tmp_path):
     recording = beat.upper_body_recording(take)
-    prepared = prepare_recording(recording, 15.0, MelConfig(), joints="all")
+    prepared = prepare_recording(recording, Features(fps=15.0, joints="all"))
     assert prepared.pose.shape == (120, 47, 6)
     np.testing.assert_array_equal(prepared.pose.reshape(120, 282), beat.pose_values(recording.motion))
     assert prepared.emotion == "happiness"

@@ -1,4 +1,4 @@
-"""Readers of the field's data sets, one module each; :data:`NAMES` is all that a command line needs to know."""
+"""Readers of the field's data sets, one module each; found by name with :func:`find_data_set`."""
 
 from importlib import import_module
 
@@ -7,8 +7,14 @@ from a2g_jax.data.datasets.source import DataSet as DataSet
 from a2g_jax.data.datasets.source import Take as Take
 from a2g_jax.errors import InputError
 
-_MODULES: dict[str, str] = {}
+_MODULES: dict[str, str] = {
+    "folder": "folder",
+}
 """Which module reads the data set of a name."""
+
+
+#: All that can be asked for.
+NAMES = tuple(_MODULES)
 
 
 def find_data_set(name: str) -> DataSet:

@@ -38,5 +38,7 @@ class DataSet:
     """All recordings under the data set's folder, in a fixed order; ``InputError`` if the folder is another one."""
     read: Callable[[Take, int], Recording | PoseRecording]
     """A recording with its audio at a sample rate. A function of a module, so that worker processes can be sent it."""
+    pose: str = "6d"
+    """The representation that its poses have where nobody asks for another."""
     about: str = ""
     """Where to get it, its licence, how it lies on disk, and which split is official."""

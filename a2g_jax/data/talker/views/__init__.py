@@ -1,1 +1,1 @@
-"""The generated talker as the public data sets would have recorded it: BEAT, Speech2Gesture, TED; and capture noise."""
+"""The talker as the field's data sets show their speakers."""

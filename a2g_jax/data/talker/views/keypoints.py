@@ -40,6 +40,20 @@ KEYPOINTS = _names()
 """Which point of the talker each of the 49 is; wrists come twice, as the end of an arm and as the start of a hand."""
 
 
+def _bones() -> tuple[tuple[int, int], ...]:
+    bones = [(0, 1), (1, 2), (2, 3), (0, 4), (4, 5), (5, 6)]
+    for elbow_end, wrist in ((6, 7), (3, 28)):
+        bones.append((elbow_end, wrist))
+        for finger in range(5):
+            first = wrist + 1 + 4 * finger
+            bones += [(wrist, first), *((first + number, first + number + 1) for number in range(3))]
+    return tuple(bones)
+
+
+KEYPOINT_BONES = _bones()
+"""Pairs of keypoints that a drawing joins."""
+
+
 @dataclass(frozen=True)
 class Camera:
     """A pinhole camera in front of the speaker, looking straight at them; the image's origin is its centre.

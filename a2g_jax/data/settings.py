@@ -1,0 +1,67 @@
+"""What a corpus keeps of a recording, and the settings of the papers."""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from a2g_jax.data.representation import WIDTHS
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+
+JOINTS = ("body", "upper-body", "all")
+
+
+@dataclass(frozen=True)
+class Features:
+    """Features of audio and pose, at the same times."""
+
+    fps: float = 30.0
+    mel: MelConfig = field(default_factory=MelConfig)
+    pose: str = "6d"
+    """A representation that :mod:`a2g_jax.data.representation` knows."""
+    joints: str = "body"
+    """``"body"``: the 22 body joints; ``"upper-body"``: 47 joints with fingers; ``"all"``: the rig as it is."""
+    waveform: bool = False
+    """Whether the audio itself is kept too, as 16-bit samples, for models that look at it otherwise."""
+
+    def __post_init__(self) -> None:
+        """Refuse what there is not."""
+        if self.pose not in WIDTHS:
+            raise InputError(f"--pose: there is no {self.pose!r}; there are: {', '.join(WIDTHS)}.")
+        if self.joints not in JOINTS:
+            raise InputError(f"--joints: there is no {self.joints!r}; there are: {', '.join(JOINTS)}.")
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values."""
+        return asdict(self)
+
+
+_FLOW_RANGE = 80.0
+
+#: By the name of the paper and the data it takes.
+PRESETS: dict[str, Features] = {
+    # Audio2Gestures, Sec. 5.3.1: 64 bands at the motion's 30 frames a second, body joints in 6D.
+    "audio2gestures": Features(),
+    # Its experiments in 2D, after Speech2Gesture: 64 bands at 60 Hz, four spectra to a frame; keypoints at 15.
+    "audio2gestures-2d": Features(
+        fps=15.0, mel=MelConfig(window=400, low_hz=125.0, high_hz=7500.0, stack=4), pose="keypoints", joints="all"
+    ),
+    # The flow on Trinity, after StyleGestures: 27 bands at 20 frames a second, exponential maps.
+    "stylized-flow": Features(fps=20.0, mel=MelConfig(bands=27, range_db=_FLOW_RANGE), pose="exponential"),
+    # The flow on TED: 29 bands and directions of bones at 15 frames a second.
+    "stylized-flow-ted": Features(
+        fps=15.0, mel=MelConfig(bands=29, range_db=_FLOW_RANGE), pose="directions", joints="all"
+    ),
+    # EmotionGesture: 47 joints in 6D at 15 frames a second; its 128 x 124 windows are made from the waveform.
+    "emotion-gesture": Features(fps=15.0, joints="upper-body", waveform=True),
+}
+
+
+def find_features(name: str) -> Features:
+    """The settings of a paper.
+
+    Raises:
+        InputError: there are none of that name.
+    """
+    if name not in PRESETS:
+        raise InputError(f"--features: there is no {name!r}; there are: {', '.join(PRESETS)}.")
+    return PRESETS[name]
