@@ -1,0 +1,69 @@
+"""Finding the files of a data set, and reading the tables that list them."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from a2g_jax.data.datasets.source import Take
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import check_readable
+
+#: What data sets call the parts of their official splits.
+SPLIT_NAMES = {"train": "train", "val": "validation", "valid": "validation", "dev": "validation", "test": "test"}
+
+
+def check_folder(folder: Path, expected: str) -> None:
+    """Raise ``InputError`` unless there is such a folder; ``expected`` says what to name instead."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder; name {expected}.")
+
+
+def visible_files(folder: Path, pattern: str) -> list[Path]:
+    """Files anywhere under a folder, in the order of their paths, without hidden ones and those in hidden folders."""
+    return [
+        path
+        for path in sorted(folder.rglob(pattern))
+        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    ]
+
+
+def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Line number and named columns of each row of a comma-separated table with a header, one row at a time.
+
+    Raises:
+        InputError: no such file, not UTF-8 text, without a column, or a row that is too short.
+    """
+    path = check_readable(path, f"a table with the columns {', '.join(columns)}")
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = csv.reader(file)
+        try:
+            header = [name.strip() for name in next(rows, [])]
+            missing = [name for name in columns if name not in header]
+            if missing:
+                raise InputError(f"{path}, line 1: has no column {missing[0]!r}; expected {', '.join(columns)}.")
+            places = [header.index(name) for name in columns]
+            for row in rows:
+                if not any(cell.strip() for cell in row):
+                    continue
+                if len(row) <= max(places):
+                    raise InputError(f"{path}, line {rows.line_num}: has {len(row)} cells; expected {len(header)}.")
+                yield rows.line_num, {name: row[at].strip() for name, at in zip(columns, places, strict=True)}
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: is not UTF-8 text; save the table as UTF-8.") from None
+        except csv.Error as error:
+            raise InputError(f"{path}, line {rows.line_num}: is damaged ({error}); download it again.") from None
+
+
+def unique_names(takes: Sequence[Take]) -> list[Take]:
+    """The takes, with ``-2``, ``-3`` ... behind names that come again."""
+    used: set[str] = set()
+    result = []
+    for take in takes:
+        name, number = take.name, 1
+        while name in used:
+            number += 1
+            name = f"{take.name}-{number}"
+        used.add(name)
+        result.append(take if number == 1 else replace(take, name=name))
+    return result

@@ -1,0 +1,50 @@
+"""Speech that lies in an archive as an array and not in an audio file of its own."""
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.io.audio import SILENCE
+
+#: Peak above which floating-point samples cannot be audio in -1 to 1.
+_LOUDEST = 100.0
+_LOWEST_RATE, _HIGHEST_RATE = 1_000, 1_000_000
+
+
+def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str) -> Float[np.ndarray, " N"]:
+    """Mono float32 samples at ``sample_rate``, under the conditions of :func:`~a2g_jax.io.audio.read_audio`.
+
+    Args:
+        samples: one channel, signed integers of any width (scaled to -1 to 1) or floating-point numbers.
+        rate: theirs, Hz.
+        place: what errors name: the file and the array.
+
+    Raises:
+        InputError: of another shape or type, empty, with NaN or infinities, silent, or not scaled to -1 to 1.
+    """
+    flat = samples.reshape(-1) if samples.ndim == 2 and 1 in samples.shape else samples
+    if flat.ndim != 1 or flat.dtype.kind not in "if":
+        raise InputError(f"{place}: expected one channel of samples; got {samples.dtype} of shape {samples.shape}.")
+    if len(flat) == 0:
+        raise InputError(f"{place}: holds no samples; leave this recording out.")
+    if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
+        raise InputError(f"{place}: has a sample rate of {rate} Hz; expected {_LOWEST_RATE} to {_HIGHEST_RATE}.")
+    if flat.dtype.kind == "i":
+        sound = (flat / float(2 ** (8 * flat.dtype.itemsize - 1))).astype(np.float32)
+    else:
+        sound = flat.astype(np.float32)
+    finite = np.isfinite(sound)
+    if not finite.all():
+        raise InputError(f"{place}: holds NaN or infinity at {np.argmin(finite) / rate:.3f} s; leave it out.")
+    peak = float(np.max(np.abs(sound)))
+    if peak > _LOUDEST:
+        raise InputError(f"{place}: has samples as large as {peak:.4g}; scale them to -1 to 1.")
+    if peak < SILENCE:
+        raise InputError(f"{place}: is silent (its peak is below -70 dB of full scale); leave this recording out.")
+    if rate == sample_rate:
+        return sound
+    import soxr  # takes a while to load, and many sets need none of it
+
+    length = max(1, round(len(sound) * sample_rate / rate))
+    result = np.asarray(soxr.resample(sound, rate, sample_rate, quality="HQ"), np.float32)[:length]
+    return np.pad(result, (0, length - len(result)))
