@@ -1,8 +1,8 @@
-"""The pictures of the generated corpus in the README: one sentence, five right motions; and the page of the data.
+"""The pictures in the README: the demo; one generated sentence and five right motions; the page of the data.
 
     python -m experiments.pictures [--out docs/pictures] [--seed 4]
 
-Needs playwright, Pillow and Chromium. Writes ``talker.png`` and ``talker_page.png``.
+Needs playwright, Pillow and Chromium. Writes ``demo.png``, ``talker.png`` and ``talker_page.png``.
 """
 
 import argparse
@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from a2g_jax.cli import main as run_command
 from a2g_jax.data.talker.recordings import plan_from_json
 from a2g_jax.data.talker.truth import GestureTruth
 from a2g_jax.generation.deliver_talk import right_motions
@@ -92,6 +93,14 @@ def page_picture(path: Path, page: Path, time: float) -> None:
             _save(image.convert("RGB"), path)
 
 
+def demo_picture(path: Path, folder: Path, time: float) -> None:
+    """The page of ``a2g demo`` at a moment."""
+    if run_command(["demo", "--out", str(folder), "--formats", "html"]):
+        raise SystemExit("the demo failed")
+    screenshot_page(folder / "index.html", path, width=1280, height=800, time=time)
+    print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+
+
 def _save(image: Image.Image, path: Path) -> None:
     """As 256 colours, a third of the bytes; most go to the figures, of which the eye sees every step of shading."""
     pixels = np.asarray(image).reshape(-1, 3)
@@ -105,12 +114,14 @@ def _save(image: Image.Image, path: Path) -> None:
 
 
 def main() -> None:
-    """Write both pictures."""
+    """Write all pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
     parser.add_argument("--seed", type=int, default=4)
+    parser.add_argument("--time", type=float, default=9.0, help="of the demo's picture, seconds")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
+        demo_picture(options.out / "demo.png", Path(folder) / "demo", options.time)
         for name, seconds in (("talker", SENTENCE), ("talker_page", 20.0)):
             recording = TalkRequest(seconds=seconds, seed=options.seed, fingers=True).recording()
             shown = list(right_motions(recording, 5, options.seed))
