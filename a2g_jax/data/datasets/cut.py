@@ -1,0 +1,46 @@
+"""A piece of a recording."""
+
+from dataclasses import replace
+from typing import Any
+
+from a2g_jax.data.recording import Recording, Word
+from a2g_jax.errors import InputError
+
+
+def cut(recording: Recording, start: float, end: float | None = None) -> Recording:
+    """The recording from ``start`` to ``end`` (None: to its end), seconds, with times counted from ``start``.
+
+    Words and timed labels (annotations that are lists of entries with ``start`` and ``end``) that reach over an end
+    are cut there. A piece that the recording is too short for ends where the recording does.
+
+    Raises:
+        InputError: nothing of the motion or the audio lies there.
+    """
+    motion, rate = recording.motion, recording.sample_rate
+    stop = max(motion.seconds, len(recording.audio) / rate) if end is None else end
+    moved = motion.clip(round(start * motion.fps), round(stop * motion.fps))
+    heard = recording.audio[round(start * rate) : round(stop * rate)]
+    if moved.frames == 0 or len(heard) == 0:
+        raise InputError(
+            f"{', '.join(recording.sources) or recording.name}: {motion.seconds:.2f} s of motion and "
+            f"{len(recording.audio) / rate:.2f} s of audio; expected more than {start} s, where the piece "
+            f"{recording.name} starts. Is a file cut short?"
+        )
+    words = tuple(
+        Word(word.text, max(word.start - start, 0.0), min(word.end, stop) - start)
+        for word in recording.words
+        if word.end > start and word.start < stop
+    )
+    annotations = {name: _shifted(value, start, stop) for name, value in recording.annotations.items()}
+    return replace(recording, motion=moved, audio=heard, words=words, annotations=annotations)
+
+
+def _shifted(value: Any, start: float, stop: float) -> Any:
+    timed = isinstance(value, list) and all(isinstance(each, dict) and {"start", "end"} <= set(each) for each in value)
+    if not timed:
+        return value
+    return [
+        {**each, "start": max(each["start"] - start, 0.0), "end": min(each["end"], stop) - start}
+        for each in value
+        if each["end"] > start and each["start"] < stop
+    ]
