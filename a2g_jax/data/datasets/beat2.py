@@ -14,12 +14,14 @@ What is made of them:
 - ``additional`` in the table is for training: EMAGE adds it to the training set or leaves it out.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
 
-from a2g_jax.data.datasets.beat_labels import read_meanings, speaker_and_emotion
-from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, table_rows, unique_names, visible_files
+from a2g_jax.data.datasets.beat_take import emotion, read_semantics
+from a2g_jax.data.datasets.csv_tables import read_columns
+from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, unique_names
 from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
 from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.data.recording import Recording
@@ -32,6 +34,8 @@ FPS = 30.0
 _POSES, _SPLIT = "smplxflame_30", "train_test_split.csv"
 _EXPECTED = f"BEAT2's, with {_POSES}/<id>.npz, wave16k/<id>.wav and {_SPLIT} in it"
 _TYPES = {**SPLIT_NAMES, "additional": "train"}
+#: Speaker, type, first and last sequence number, as in BEAT.
+_NAME = re.compile(r"\d+_([^_]+)_(\d)_(\d{1,4})_(\d{1,4})")
 _ARRAYS = ("poses", "trans", "expressions", "mocap_frame_rate")
 
 
@@ -51,12 +55,12 @@ def _takes(language: Path) -> list[Take]:
     splits: dict[str, str] = {}
     table = language / _SPLIT
     if table.exists():
-        for line, row in table_rows(table, ("id", "type")):
+        for line, row in read_columns(table, ("id", "type")):
             if row["type"] not in _TYPES:
                 raise InputError(f"{table}, line {line}: expected {', '.join(_TYPES)}; got {row['type'][:40]!r}.")
             splits[row["id"]] = _TYPES[row["type"]]
     takes = []
-    for path in visible_files(language / _POSES, "*.npz"):
+    for path in files_with(language / _POSES, ".npz", _EXPECTED):
         files = [path, language / "wave16k" / f"{path.stem}.wav"]
         extra = (language / "textgrid" / f"{path.stem}.TextGrid", language / "sem" / f"{path.stem}.txt")
         files += [file for file in extra if file.is_file()]
@@ -86,16 +90,16 @@ def read(take: Take, sample_rate: int) -> Recording:
     face = arrays["expressions"].shape[-1] if arrays["expressions"].ndim == 2 else 0
     annotations: dict = {"face": {"expressions": int(face), "jaw": True}}
     if meanings:
-        annotations["semantic"] = read_meanings(Path(meanings))
-    speaker, emotion = speaker_and_emotion(Path(path).stem)
+        annotations["semantic"] = read_semantics(Path(meanings))
+    match = _NAME.fullmatch(Path(path).stem)
     return Recording(
         name=take.name,
         audio=read_audio(audio, sample_rate),
         sample_rate=sample_rate,
         motion=motion,
         words=read_words(grid) if grid else (),
-        speaker=speaker,
-        emotion=emotion,
+        speaker=match[1] if match else "",
+        emotion=emotion(int(match[2]), int(match[3]), int(match[4])) if match else "",
         sources=take.sources,
         annotations=annotations,
     )

@@ -44,7 +44,7 @@ def bridge_gaps(values: Float[np.ndarray, "T P D"], fps: float, place: str) -> F
     return np.where(lost[..., None], (1.0 - share) * low + share * high, values).astype(values.dtype)
 
 
-def rate_of(frames: float, seconds: float, slack: float) -> float:
+def rate_of(frames: int, seconds: float, slack: float) -> float:
     """Frames a second of ``frames`` that last ``seconds``: the usual rate that fits, else their quotient.
 
     Args:

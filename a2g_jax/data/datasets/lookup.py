@@ -1,10 +1,11 @@
-"""Finding the files of a data set, and reading the tables that list them."""
+"""Finding the recordings of a data set: folders, large tables, names."""
 
 import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from a2g_jax.data.datasets.named_files import list_files
 from a2g_jax.data.datasets.source import Take
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable
@@ -19,17 +20,15 @@ def check_folder(folder: Path, expected: str) -> None:
         raise InputError(f"{folder}: is not a folder; name {expected}.")
 
 
-def visible_files(folder: Path, pattern: str) -> list[Path]:
-    """Files anywhere under a folder, in the order of their paths, without hidden ones and those in hidden folders."""
-    return [
-        path
-        for path in sorted(folder.rglob(pattern))
-        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
-    ]
+def files_with(folder: Path, suffix: str, expected: str) -> list[Path]:
+    """Files under a folder with a suffix, as :func:`~a2g_jax.data.datasets.named_files.list_files` finds them."""
+    return [path for path in list_files(folder, expected) if path.suffix.lower() == suffix]
 
 
 def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:
     """Line number and named columns of each row of a comma-separated table with a header, one row at a time.
+
+    For tables of a row a window, which :func:`~a2g_jax.data.datasets.csv_tables.read_columns` is too small for.
 
     Raises:
         InputError: no such file, not UTF-8 text, without a column, or a row that is too short.

@@ -6,14 +6,18 @@ from datasets_beat2_tree import WORDS, made_up_speech, write_beat2
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.datasets.beat2 import DATASET
-from a2g_jax.data.datasets.beat_labels import speaker_and_emotion
 from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON, TALKER_SKELETON
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import find_rig, match_rigs, retarget
 from a2g_jax.io.bvh import read_bvh
 
-SPLIT = [("2_scott_0_1_1", "train"), ("1_wayne_0_73_73", "test"), ("5_stewart_1_2_2", "val"), ("2_scott_0_9_9", "additional")]  # fmt: skip
+SPLIT = [
+    ("2_scott_0_1_1", "train"),
+    ("1_wayne_0_73_73", "test"),
+    ("5_stewart_1_2_2", "val"),
+    ("2_scott_0_9_9", "additional"),
+]
 
 
 @pytest.fixture
@@ -44,7 +48,7 @@ def test_what_was_written_is_read(tree):
         assert found.speaker == name.split("_")[1]
         assert found.annotations["face"] == {"expressions": 100, "jaw": True}
         assert found.annotations["semantic"][1] == {
-            "label": "05_iconic_h", "start": 0.5, "end": 1.25, "score": 0.8, "words": "there",
+            "label": "05_iconic_h", "start": 0.5, "end": 1.25, "score": 0.8, "keywords": "there",
         }  # fmt: skip
         assert set(found.sources) == set(map(str, root.rglob(f"{name}.*")))
     emotions = {take.name: DATASET.read(take, 8000).emotion for take in takes}
@@ -117,14 +121,6 @@ def test_wrong_folders_and_files(tree, tmp_path):
         path.unlink()
     with pytest.raises(InputError, match="no wave16k/ with"):
         DATASET.find(root)
-
-
-def test_names_of_beat():
-    assert speaker_and_emotion("13_lu_0_111_111") == ("lu", "disgust")
-    assert speaker_and_emotion("13_lu_2_87_94") == ("lu", "contempt")
-    assert speaker_and_emotion("13_lu_1_87_94") == ("lu", "")
-    assert speaker_and_emotion("13_lu_0_119_119") == ("lu", "")
-    assert speaker_and_emotion("anything") == ("", "")
 
 
 # --- The real recording
