@@ -39,6 +39,13 @@ def _number(kind: Callable[[str], Any], low: float | int, high: float | int, mea
     return convert
 
 
+def _reader(text: str) -> str:
+    """A name of something to prepare, or a Python file that reads it."""
+    if text not in READERS and not text.endswith(".py"):
+        raise argparse.ArgumentTypeError(f"expected one of {', '.join(READERS)}, or a reader.py; got {text!r}")
+    return text
+
+
 _positive = _number(float, 1e-6, 1e9, "a number above 0")
 _count = _number(int, 1, 1000, "a whole number from 1 to 1000")
 _rate = _number(int, 8000, 96000, "a whole number from 8000 to 96000")
@@ -100,7 +107,9 @@ def make_parser() -> argparse.ArgumentParser:
     prepare = command(
         "prepare", "Make a corpus from recordings, or generate one. Stopped before its end, the same command goes on."
     )
-    prepare.add_argument("reader", nargs="?", choices=READERS, metavar="NAME", help="talker, or a data set: see --list")
+    prepare.add_argument(
+        "reader", nargs="?", type=_reader, metavar="NAME", help="talker, a data set (see --list), or a reader.py"
+    )
     prepare.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
     prepare.add_argument("--list", action="store_true", help="say what can be prepared, and do nothing")
     prepare.add_argument("--out", metavar="CORPUS", help="folder to make")

