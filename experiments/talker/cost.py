@@ -40,6 +40,7 @@ CORPORA = {
 def stage(name: str, seed: int) -> Any:
     """A function that does one stage for a minute of talk."""
     from a2g_jax.data.generated import TalkerOptions, generate_rows
+    from a2g_jax.data.settings import Features
     from a2g_jax.data.talker.gestures import gesticulate
     from a2g_jax.data.talker.plan import plan_speech
     from a2g_jax.data.talker.voice import synthesise
@@ -55,7 +56,7 @@ def stage(name: str, seed: int) -> Any:
         "motion": lambda: gesticulate(plan, rng(), fps),
         "fingers": lambda: gesticulate(plan, rng(), fps, fingers=True),
         "features": lambda: log_mel(audio, mel, fps, round(SECONDS * fps)),
-        "recording": lambda: generate_rows(role, fps, 0.0, False, mel),
+        "recording": lambda: generate_rows(role, 0.0, False, "body", Features()),
     }[name]
 
 
