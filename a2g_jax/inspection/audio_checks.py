@@ -1,0 +1,88 @@
+"""Faults of a speech recording alone: clipping, silence, a constant offset, too low a level."""
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.features.mel import active_level_db
+from a2g_jax.inspection.finding import Finding, Place
+
+#: Samples in a row at the largest value that make a clipped peak; a peak of speech has one or two.
+CLIPPED_RUN = 3
+#: How near the largest value a sample must be to be cut off at it; a dithered 16-bit converter strays by less.
+CLIPPED_WITHIN = 1e-3
+#: Share of clipped samples that is heard as distortion; below it a few plosives hit the limit.
+CLIPPED_SHARE = 1e-4
+#: Seconds without speech, and decibels below the level of speech that count as silence. Pauses of a talking person
+#: last 2 to 4 s at most.
+SILENT_SECONDS, SILENT_BELOW = 5.0, 40.0
+#: A constant offset this many decibels below the level of speech shifts every window's lowest band.
+OFFSET_BELOW = 26.0
+#: Level of active speech, dB of full scale, below which 16-bit rounding and hum come close.
+FAINT = -50.0
+_BLOCK = 0.025
+
+
+def peak_db(audio: Float[np.ndarray, " N"]) -> float:
+    """Largest sample in dB of full scale; -100 for silence."""
+    return float(20 * np.log10(max(np.abs(audio).max(initial=0.0), 1e-5)))
+
+
+def clipped_share(audio: Float[np.ndarray, " N"]) -> tuple[float, int]:
+    """Share of samples that lie in flat peaks, and where the first is."""
+    size = np.abs(audio)
+    flat = size >= (1 - CLIPPED_WITHIN) * size.max(initial=1e-9)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(np.int8))).reshape(-1, 2)
+    runs = edges[edges[:, 1] - edges[:, 0] >= CLIPPED_RUN]
+    if len(runs) == 0:
+        return 0.0, 0
+    return float((runs[:, 1] - runs[:, 0]).sum() / len(audio)), int(runs[0, 0])
+
+
+def check_clipping(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+    """Peaks cut off at the largest value that the recorder, or a later step, could hold."""
+    share, first = clipped_share(audio)
+    if share < CLIPPED_SHARE:
+        return []
+    message = f"{100 * share:.2f} % of the samples are clipped at {peak_db(audio):.1f} dB of full scale."
+    mend = "Record at a lower level, or use the original before it was amplified."
+    return [Finding("warning", "clipping", message, mend, Place(seconds=first / sample_rate), share)]
+
+
+def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+    """Long stretches far below the level of speech."""
+    size = int(_BLOCK * sample_rate)
+    count = len(audio) // size
+    if count == 0:
+        return []
+    power = np.mean(np.square(audio[: count * size].reshape(count, size), dtype=np.float64), axis=1)
+    quiet = 10 * np.log10(power + 1e-12) < active_level_db(audio, sample_rate) - SILENT_BELOW
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8))).reshape(-1, 2)
+    findings = []
+    for start, stop in edges[edges[:, 1] - edges[:, 0] >= SILENT_SECONDS / _BLOCK]:
+        seconds = float((stop - start) * _BLOCK)
+        message = f"silent for {seconds:.1f} s."
+        mend = "Cut it out, unless the speaker listens meanwhile."
+        findings.append(Finding("warning", "silence", message, mend, Place(seconds=float(start * _BLOCK)), seconds))
+    return findings
+
+
+def check_level(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+    """A constant offset of the samples, and speech that is too faint."""
+    level, offset = active_level_db(audio, sample_rate), abs(float(np.mean(audio, dtype=np.float64)))
+    findings = []
+    if 20 * np.log10(max(offset, 1e-9)) > level - OFFSET_BELOW:
+        message = f"the samples are off zero by {offset:.4f} on average."
+        findings.append(Finding("warning", "dc", message, "Remove the offset with a high-pass filter.", value=offset))
+    if level < FAINT:
+        message = f"speech has a level of only {level:.0f} dB of full scale."
+        findings.append(Finding("warning", "faint", message, "Record at a higher level.", value=level))
+    return findings
+
+
+def check_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+    """All checks of a speech recording alone."""
+    return [
+        *check_clipping(audio, sample_rate),
+        *check_silence(audio, sample_rate),
+        *check_level(audio, sample_rate),
+    ]

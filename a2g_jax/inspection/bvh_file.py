@@ -1,0 +1,163 @@
+"""A BVH file as it is written: header, channels, and as much of the motion as there is."""
+
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.inspection.finding import Finding, Place
+from a2g_jax.inspection.motion_checks import FLIP_DEGREES, rotation_steps
+from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.bvh_hierarchy import Joint, parse_hierarchy
+from a2g_jax.io.files import check_readable
+
+#: A channel that leaps by more between two frames, in degrees, went once around.
+WRAP = 180.0
+_HEADER = re.compile(r"\A(\s*Frames?\s*+:?\s*+)([0-9]{1,15})(\s*?\n\s*Frame\s*+Time\s*+:?\s*+)(\S{1,40})[^\n]*\n", re.I)
+_MOTION = re.compile(r"^[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
+
+
+@dataclass(frozen=True, eq=False)
+class BvhFile:
+    """What a BVH file says, whether or not it keeps it."""
+
+    joints: list[Joint]
+    claimed: int
+    """Frames by the header."""
+    frame_time: str
+    rows: list[str]
+    """Lines of the motion that are filled."""
+    head: str
+    """The text up to the number of frames."""
+    middle: str
+    """The text between it and the motion."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels in the order of the columns, such as ``"Hips Zrotation"``."""
+        return tuple(f"{joint.name} {channel}" for joint in self.joints for channel in joint.channels or ())
+
+    @property
+    def orders(self) -> tuple[str, ...]:
+        """Rotation orders that joints have, the most frequent first."""
+        found = ["".join(channel[0] for channel in joint.channels or () if channel.endswith("rotation"))
+                 for joint in self.joints]  # fmt: skip
+        kinds = [order for order in dict.fromkeys(found) if order]
+        return tuple(sorted(kinds, key=lambda order: -found.count(order)))
+
+    @property
+    def root_order(self) -> tuple[str, ...]:
+        """Channels of the root."""
+        return tuple(self.joints[0].channels or ())
+
+
+def scan_bvh(path: Path) -> BvhFile:
+    """Take a BVH file apart without judging its motion.
+
+    Raises:
+        InputError: it has no skeleton, or no motion with the usual header.
+    """
+    path = check_readable(path, "a BVH file")
+    text = path.read_bytes().decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    start = _MOTION.search(text)
+    joints = parse_hierarchy(path, text[: start.start()] if start else text[:4_000_000])
+    header = _HEADER.match(text[start.end() :]) if start else None
+    if start is None or header is None:
+        read_bvh(path)  # says what is wrong, and in which line
+        raise InputError(f"{path}: expected 'Frames:' and 'Frame Time:' after MOTION.")
+    body = text[start.end() + header.end() :]
+    return BvhFile(
+        joints,
+        int(header[2]),
+        header[4],
+        [line for line in body.split("\n") if line.strip()],
+        text[: start.end()] + header[1],
+        header[3] + header[4] + "\n",
+    )
+
+
+def check_frame_count(file: BvhFile) -> list[Finding]:
+    """Frames by the header against lines that are there."""
+    there = len(file.rows)
+    if there == file.claimed:
+        return []
+    message = f"the header says {file.claimed} frames and there are {there} lines of motion."
+    mend = f"Write 'Frames: {there}', or copy the file again if it was cut short."
+    return [Finding("warning", "frame-count", message, mend, Place(frame=min(there, file.claimed)), float(there))]
+
+
+def check_rows(file: BvhFile) -> tuple[list[Finding], Float[np.ndarray, "T C"]]:
+    """Lines with too few or too many numbers, and the numbers of the lines up to the first such one."""
+    count = len(file.channels)
+    findings: list[Finding] = []
+    stop = len(file.rows)
+    lengths = np.array([len(row.split()) for row in file.rows])
+    if (wrong := np.flatnonzero(lengths != count)).size:
+        stop = int(wrong[0])
+        message = (
+            f"{len(wrong)} lines of motion do not have {count} numbers, one a channel; this one has {lengths[stop]}."
+        )
+        findings.append(Finding("warning", "columns", message, "Export the file again.", Place(frame=stop)))
+    try:
+        values = np.array([row.split() for row in file.rows[:stop]], np.float64).reshape(stop, count)
+    except ValueError:
+        message = "some values of the motion are no numbers."
+        findings.append(Finding("warning", "numbers", message, "Export the file again."))
+        return findings, np.zeros((0, count))
+    finite = np.isfinite(values).all(axis=1)
+    if not finite.all():
+        first = int(np.argmin(finite))
+        message = f"{int((~finite).sum())} frames hold NaN or infinite values."
+        findings.append(Finding("warning", "nan", message, "Cut them out or fill them.", Place(frame=first)))
+        values = values[:first]
+    return findings, values
+
+
+def check_wraps(file: BvhFile, values: Float[np.ndarray, "T C"], motion: Motion) -> list[Finding]:
+    """Euler angles that leap by a whole turn: the same rotation, but poison for filters and networks on angles."""
+    rotations = [at for at, name in enumerate(file.channels) if name.endswith("rotation")]
+    owners = np.repeat(np.arange(len(file.joints)), [len(joint.channels or ()) for joint in file.joints])
+    # Where the rotation leaps too, it is a flip: check_flips says so.
+    turned = rotation_steps(motion)[:, owners[rotations]] > FLIP_DEGREES
+    leaps = np.sum((np.abs(np.diff(values[:, rotations], axis=0)) > WRAP) & ~turned, axis=0)
+    if not leaps.any():
+        return []
+    worst = int(np.argmax(leaps))
+    message = (
+        f"Euler angles leap by about 360 degrees {int(leaps.sum())} times in {int((leaps > 0).sum())} channels, "
+        f"most in {file.channels[rotations[worst]]}; rotations read from them do not."
+    )
+    return [Finding("info", "euler-wrap", message, value=float(leaps.sum()))]
+
+
+def read_what_there_is(path: Path, file: BvhFile, frames: int) -> Motion | None:
+    """The motion of the first ``frames`` lines, with a header that says so; None where there are none.
+
+    Raises:
+        InputError: what :func:`~a2g_jax.io.bvh.read_bvh` raises, about the file itself.
+    """
+    if frames == 0:
+        return None
+    if frames == len(file.rows) == file.claimed:
+        return read_bvh(path)
+    with _mended(file, frames) as temporary:
+        try:
+            return read_bvh(temporary)
+        except InputError as error:
+            raise InputError(str(error).replace(str(temporary), str(path))) from None
+
+
+@contextmanager
+def _mended(file: BvhFile, frames: int) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mended.bvh"
+        rows = "\n".join(file.rows[:frames])
+        path.write_text(f"{file.head}{frames}{file.middle}{rows}\n", encoding="utf-8")
+        yield path

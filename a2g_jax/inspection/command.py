@@ -1,0 +1,46 @@
+"""What ``a2g inspect`` does; its flags are in :mod:`a2g_jax.inspection.arguments`."""
+
+import argparse
+import json
+from pathlib import Path
+
+from a2g_jax.data.corpus import MANIFEST
+from a2g_jax.errors import InputError
+from a2g_jax.inspection.corpora import inspect_corpus
+from a2g_jax.inspection.files import Inspected, inspect_file, inspect_together
+from a2g_jax.inspection.folders import inspect_folder
+from a2g_jax.inspection.report import Report
+from a2g_jax.inspection.runs import inspect_run
+from a2g_jax.training.run import RUN_FILE
+
+
+def inspect(path: Path, audio: Path | None = None) -> Report:
+    """Look at a file, a folder of recordings, a corpus or a run.
+
+    Args:
+        audio: the speech that belongs to a motion or a transcript.
+
+    Raises:
+        InputError: there is no such file or folder, or nothing is known about its kind.
+    """
+    if path.is_dir():
+        if audio is not None:
+            raise InputError(f"{path}: is a folder; --audio belongs to one motion or transcript.")
+        if (path / MANIFEST).exists():
+            return inspect_corpus(path)
+        if (path / RUN_FILE).exists():
+            return inspect_run(path)
+        return inspect_folder(path)
+    found: Inspected = inspect_file(path)
+    if audio is not None:
+        found = inspect_together(found, inspect_file(audio))
+    return Report(found.path, found.kind, found.facts, found.findings)
+
+
+def run(options: argparse.Namespace, _extra: list[str]) -> int:
+    """``a2g inspect``; returns the exit status: 1 if ``--strict`` was asked for and there are warnings, else 0."""
+    report = inspect(Path(options.path), Path(options.audio) if options.audio else None)
+    print(
+        json.dumps(report.to_json(), indent=2, ensure_ascii=False, allow_nan=False) if options.json else report.text()
+    )
+    return 1 if options.strict and report.warnings else 0

@@ -1,0 +1,181 @@
+"""Inspecting a corpus made by ``a2g prepare``."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.corpus import Corpus, Entry
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.rig import Rig
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.inspection.alike import Print, bands_print, check_copies, poses_print
+from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.describe import try_rig
+from a2g_jax.inspection.finding import Finding, Place, located
+from a2g_jax.inspection.motion_checks import check_finite, check_motion
+from a2g_jax.inspection.report import Report
+from a2g_jax.inspection.sync import at_rate, check_offset, measure_offset, wrist_places
+from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.progress import progress_bar
+
+#: A standard deviation so far above the median one, or 0, is of a feature with outliers or without content.
+_WIDE = 20.0
+
+
+def inspect_corpus(path: Path) -> Report:
+    """Recordings, splits, statistics, and what is wrong with the arrays or shared between the splits.
+
+    Raises:
+        InputError: it is no corpus, or a damaged one.
+    """
+    corpus = Corpus.open(path)
+    findings = check_overlaps(corpus) + check_sources(corpus) + check_statistics(corpus)
+    heard: list[Print] = []
+    seen: list[Print] = []
+    rig: Rig | None = None
+    with progress_bar(len(corpus.recordings), "inspecting", "recording") as bar:
+        for entry, audio, pose, root in _rows(corpus):
+            faults = check_finite(audio, "audio features") + check_finite(pose, "poses") + check_finite(root, "root")
+            heard.append(bands_print(audio[:, : corpus.mel.bands], corpus.fps))
+            seen.append(poses_print(pose.reshape(len(pose), -1), corpus.fps))
+            if not faults and isinstance(corpus.body, Skeleton) and corpus.representation in ("6d", "exponential"):
+                motion = corpus.motion(entry.first, entry.first + entry.frames)
+                if rig is None:
+                    rig = try_rig(motion, str(path))[0]
+                faults = _motion_faults(motion, rig, audio[:, : corpus.mel.bands])
+            if entry.samples:
+                samples = corpus.waveform[entry.first_sample : entry.first_sample + entry.samples]
+                faults += check_audio(samples.astype(np.float32) / 32768, corpus.mel.sample_rate)
+            findings += located(faults, recording=entry.name)
+            bar.update()
+    names, parts = [entry.name for entry in corpus.recordings], _splits_of(corpus)
+    findings += check_copies("audio", heard, names, parts) + check_copies("motion", seen, names, parts)
+    return Report(str(path), "corpus", corpus_facts(corpus, rig), findings)
+
+
+def _rows(corpus: Corpus) -> Iterator[tuple[Entry, np.ndarray, np.ndarray, np.ndarray]]:
+    for entry in corpus.recordings:
+        rows = slice(entry.first, entry.first + entry.frames)
+        yield entry, np.asarray(corpus.audio[rows]), np.asarray(corpus.pose[rows]), np.asarray(corpus.root[rows])
+
+
+def _motion_faults(motion: Motion, rig: Rig | None, bands: Float[np.ndarray, "T B"]) -> list[Finding]:
+    faults = check_motion(motion, rig)
+    if rig is not None:
+        energy = 10 * np.log10(np.sum(10 ** (bands.astype(np.float64) / 10), axis=1))
+        faults += check_offset(
+            measure_offset(at_rate(energy, motion.fps), at_rate(wrist_places(motion, rig), motion.fps))
+        )
+    return faults
+
+
+def _splits_of(corpus: Corpus) -> list[frozenset[str]]:
+    found: list[set[str]] = [set() for _ in corpus.recordings]
+    for name, segments in corpus.splits.items():
+        for segment in segments:
+            found[segment.recording].add(name)
+    return [frozenset(names) for names in found]
+
+
+def check_overlaps(corpus: Corpus) -> list[Finding]:
+    """Frames of one recording that lie in two splits."""
+    by_recording: dict[int, list[tuple[int, int, str]]] = {}
+    for name, segments in corpus.splits.items():
+        for index, start, stop in segments:
+            by_recording.setdefault(index, []).append((start, stop, name))
+    findings = []
+    for index, parts in by_recording.items():
+        parts.sort()
+        for (_, stop, name), (start, _, other) in zip(parts, parts[1:], strict=False):
+            if start < stop and name != other:
+                message = f"its frames {start} to {stop} lie in both {name} and {other}."
+                place = Place(recording=corpus.recordings[index].name, frame=start, seconds=start / corpus.fps)
+                findings.append(
+                    Finding("warning", "leak", message, "Prepare the corpus anew.", place, (stop - start) / corpus.fps)
+                )
+    return findings
+
+
+def check_sources(corpus: Corpus) -> list[Finding]:
+    """Recordings made from the same files."""
+    parts = _splits_of(corpus)
+    groups: dict[frozenset[str], list[int]] = {}
+    for index, entry in enumerate(corpus.recordings):
+        if entry.sources:
+            groups.setdefault(frozenset(entry.sources.values()), []).append(index)
+    findings = []
+    for members in groups.values():
+        if len(members) < 2:
+            continue
+        splits = frozenset[str]().union(*(parts[index] for index in members))
+        names = [corpus.recordings[index].name for index in members]
+        message = f"{len(names)} recordings were made from the same files ({', '.join(names[:4])}"
+        message += f"{', ...' if len(names) > 4 else ''})"
+        if len(members) == 2 and len(splits) > 1:
+            mend = "Put both into one split; a test on what was trained on says nothing."
+            message += f", and they are in different splits ({' and '.join(sorted(splits))})."
+            findings.append(Finding("warning", "leak", message, mend, Place(recording=names[1])))
+        else:
+            # Databases hold many clips in one file; what they share is found by content.
+            findings.append(Finding("info", "same-files", f"{message}.", value=float(len(names))))
+    return findings
+
+
+def check_statistics(corpus: Corpus) -> list[Finding]:
+    """Standard deviations that no normalisation should divide by."""
+    findings = []
+    for name, statistics in corpus.statistics.items():
+        std = np.asarray(statistics.std, np.float64)
+        if (wide := std > _WIDE * np.median(std)).any() and name == "audio":
+            message = (
+                f"the spread of {int(wide.sum())} of {std.size} values of {name} is over {_WIDE:g} times the usual."
+            )
+            findings.append(Finding("warning", "statistics", message, "Look for outliers in the recordings."))
+        findings += check_finite(std, f"the spread of {name}")
+    return findings
+
+
+def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
+    """What a corpus holds."""
+    seconds = {name: sum(segment.frames for segment in parts) / corpus.fps for name, parts in corpus.splits.items()}
+    facts: dict[str, Any] = {
+        "corpus": {
+            "recordings": len(corpus.recordings),
+            "minutes": round(corpus.frames / corpus.fps / 60, 2),
+            "fps": corpus.fps,
+            "pose": f"{corpus.representation}, {corpus.rows} rows",
+            "audio": f"{corpus.mel.width} values a frame ({corpus.mel.bands} bands at {corpus.mel.sample_rate} Hz)",
+            "fingerprint": corpus.fingerprint,
+            "made by": {name: value for name, value in corpus.recipe.items() if name in ("reader", "source", "seed")},
+        },
+        "splits": {
+            name: {"recordings": len({segment.recording for segment in parts}), "seconds": round(seconds[name], 1)}
+            for name, parts in corpus.splits.items()
+        },
+        "speakers": _minutes(corpus, "speaker"),
+        "emotions": _minutes(corpus, "emotion"),
+        "statistics": {
+            name: {"mean": _spread(np.asarray(statistics.mean)), "std": _spread(np.asarray(statistics.std))}
+            for name, statistics in corpus.statistics.items()
+        },
+    }
+    if corpus.on_demand:
+        facts["corpus"]["generated in training"] = f"{corpus.parts - 1} more parts"
+    if isinstance(corpus.body, Skeleton):
+        facts["skeleton"] = skeleton_facts(corpus.body, rig)
+    return facts
+
+
+def _minutes(corpus: Corpus, label: str) -> dict[str, float]:
+    frames: Counter[str] = Counter()
+    for entry in corpus.recordings:
+        frames[getattr(entry, label) or "unknown"] += entry.frames
+    return {name: round(count / corpus.fps / 60, 2) for name, count in frames.most_common()}
+
+
+def _spread(values: Float[np.ndarray, "..."]) -> list[float]:
+    return [round(float(np.min(values)), 4), round(float(np.max(values)), 4)]

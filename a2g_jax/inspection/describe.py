@@ -1,0 +1,99 @@
+"""The numbers of a motion and of a speech recording."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import active_level_db
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import joint_places, rotation_angle, world_rotations
+from a2g_jax.geometry.retarget.rig import Rig, find_rig
+from a2g_jax.inspection.audio_checks import clipped_share, peak_db
+from a2g_jax.inspection.finding import Finding
+from a2g_jax.inspection.motion_checks import rotation_steps
+from a2g_jax.io.words import Word
+
+_TRACKED = ("L_Wrist", "R_Wrist", "Head")
+
+
+def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
+    """The body in a motion, or an info that there is none to be found."""
+    try:
+        return find_rig(motion, name=path), []
+    except InputError as error:
+        message = f"no body is found in the skeleton ({error})"
+        mend = "What needs a body (retargeting, speeds of the hands, the offset) is left out."
+        return None, [Finding("info", "no-body", " ".join(message.split()), mend)]
+
+
+def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
+    """Length, rate, how far joints turn, how fast hands and head move and where they reach."""
+    facts: dict[str, Any] = {
+        "frames": motion.frames,
+        "fps": round(motion.fps, 6),
+        "seconds": round(motion.seconds, 3),
+        "root (m)": _box(np.asarray(motion.root, np.float64)),
+    }
+    if motion.frames > 1:
+        steps = rotation_steps(motion) * motion.fps
+        facts["turning (degrees/s)"] = _percentiles(steps.max(axis=1))
+        rotations = np.asarray(motion.rotations)
+        ranges = rotation_angle(rotations, np.broadcast_to(rotations[:1], rotations.shape)).max(axis=0)
+        widest = np.argsort(-ranges)[:5]
+        facts["turned farthest from frame 0 (degrees)"] = {
+            motion.skeleton.names[j]: round(float(ranges[j]), 1) for j in widest
+        }
+    if rig is None or motion.frames < 2:
+        return facts
+    world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
+    places = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
+    places = (places + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+    chest = places[:, rig.roles["Chest"]]
+    for part in _TRACKED:
+        if part in rig.roles:
+            path = places[:, rig.roles[part]]
+            speed = np.linalg.norm(np.diff(path, axis=0), axis=1) * motion.fps
+            facts[f"{part} speed (m/s)"] = _percentiles(speed)
+            facts[f"{part} from the chest (m; left, up, forward)"] = _box(path - chest)
+    return facts
+
+
+def audio_facts(audio: Float[np.ndarray, " N"], sample_rate: int) -> dict[str, Any]:
+    """Length and loudness."""
+    return {
+        "seconds": round(len(audio) / sample_rate, 3),
+        "active level (dBFS)": round(active_level_db(audio, sample_rate), 1),
+        "peak (dBFS)": round(peak_db(audio), 1),
+        "clipped share": round(clipped_share(audio)[0], 6),
+        "mean": round(float(np.mean(audio, dtype=np.float64)), 6),
+    }
+
+
+def word_facts(words: tuple[Word, ...]) -> dict[str, Any]:
+    """How many words there are, how fast and until when."""
+    if not words:
+        return {"words": 0}
+    lengths = np.array([word.end - word.start for word in words])
+    last = max(word.end for word in words)
+    return {
+        "words": len(words),
+        "different": len({word.text.lower() for word in words}),
+        "first starts (s)": round(words[0].start, 3),
+        "last ends (s)": round(last, 3),
+        "words a minute": round(60 * len(words) / max(last - words[0].start, 1e-3), 1),
+        "length of a word (s)": _percentiles(lengths),
+    }
+
+
+def _percentiles(values: Float[np.ndarray, " N"]) -> dict[str, float]:
+    return {f"p{share}": round(float(np.percentile(values, share)), 3) for share in (50, 95, 99)} | {
+        "max": round(float(values.max()), 3)
+    }
+
+
+def _box(points: Float[np.ndarray, "T 3"]) -> list[list[float]]:
+    # Adding zero turns -0 into 0.
+    low, high = np.round(points.min(axis=0), 3) + 0.0, np.round(points.max(axis=0), 3) + 0.0
+    return [[float(a), float(b)] for a, b in zip(low, high, strict=True)]

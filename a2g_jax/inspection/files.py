@@ -1,0 +1,205 @@
+"""Inspecting one file, or a motion with its audio."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.rig import Rig
+from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_what_there_is, scan_bvh
+from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
+from a2g_jax.inspection.finding import Finding, Place, located
+from a2g_jax.inspection.motion_checks import check_finite, check_motion
+from a2g_jax.inspection.sync import (
+    Offset,
+    at_rate,
+    check_lengths,
+    check_offset,
+    energy_db,
+    measure_offset,
+    wrist_places,
+)
+from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.io.audio import audio_info, read_audio
+from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.io.transcripts import read_transcript
+from a2g_jax.io.untrusted import read_npz
+from a2g_jax.io.words import Word
+
+SAMPLE_RATE = 16000
+AUDIO = (".wav", ".flac", ".ogg", ".mp3", ".aiff", ".aif", ".au", ".w64", ".caf", ".opus")
+TRANSCRIPTS = (".textgrid", ".json", ".tsv")
+#: Seconds by which a transcript's last word may outlast the audio; aligners round.
+_WORDS_BEYOND = 0.25
+
+
+@dataclass(eq=False)
+class Inspected:
+    """What was found in one file."""
+
+    path: str
+    kind: str
+    facts: dict[str, Any]
+    findings: list[Finding] = field(default_factory=list)
+    motion: Motion | None = None
+    rig: Rig | None = None
+    audio: Float[np.ndarray, " N"] | None = None
+    words: tuple[Word, ...] | None = None
+
+
+def inspect_file(path: Path) -> Inspected:
+    """What a file holds, by its suffix.
+
+    Raises:
+        InputError: no such file, of no kind that is known, or too damaged to say anything about it.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".bvh":
+        return inspect_bvh(path)
+    if suffix == ".npz":
+        return inspect_npz(path)
+    if suffix in AUDIO:
+        return inspect_audio(path)
+    if suffix in TRANSCRIPTS:
+        words = read_transcript(path)
+        return Inspected(str(path), "transcript", {"words": word_facts(words)}, words=words)
+    known = ", ".join((".bvh", ".npz", *AUDIO[:4], *TRANSCRIPTS))
+    raise InputError(f"{path}: is nothing that can be inspected; expected {known}, a folder, a corpus or a run.")
+
+
+def inspect_bvh(path: Path) -> Inspected:
+    """A BVH file; what its header gets wrong becomes a warning, and the frames that can be read are looked at."""
+    file = scan_bvh(path)
+    findings = check_frame_count(file)
+    faults, values = check_rows(file)
+    findings += faults
+    motion = read_what_there_is(path, file, len(values))
+    facts: dict[str, Any] = {
+        "file": {
+            "frames by the header": file.claimed,
+            "frame time (s)": file.frame_time,
+            "channels": len(file.channels),
+            "root channels": " ".join(file.root_order),
+            "rotation orders": list(file.orders),
+        }
+    }
+    if motion is None:
+        return Inspected(str(path), "bvh", facts, located(findings, path=str(path)))
+    findings += check_wraps(file, values, motion)
+    inspected = _with_motion(path, "bvh", motion, facts)
+    inspected.findings = located(findings, path=str(path)) + inspected.findings
+    return inspected
+
+
+def _with_motion(path: Path, kind: str, motion: Motion, facts: dict[str, Any]) -> Inspected:
+    rig, findings = try_rig(motion, str(path))
+    findings += check_motion(motion, rig)
+    facts |= {"motion": motion_facts(motion, rig), "skeleton": skeleton_facts(motion.skeleton, rig)}
+    return Inspected(str(path), kind, facts, located(findings, path=str(path)), motion, rig)
+
+
+def inspect_audio(path: Path) -> Inspected:
+    """A speech recording."""
+    info = audio_info(path)
+    facts: dict[str, Any] = {
+        "file": {
+            "sample rate (Hz)": info.sample_rate,
+            "channels": info.channels,
+            "samples": info.frames,
+            "format": f"{info.format} {info.subtype}",
+        }
+    }
+    # At its own rate, since resampling rounds off what was clipped.
+    audio = read_audio(path, info.sample_rate)
+    facts["audio"] = audio_facts(audio, info.sample_rate)
+    findings = located(check_audio(audio, info.sample_rate), path=str(path))
+    return Inspected(str(path), "audio", facts, findings, audio=read_audio(path, SAMPLE_RATE))
+
+
+def inspect_npz(path: Path) -> Inspected:
+    """Arrays: a motion of this package, SMPL-X parameters as in BEAT2, or any others."""
+    arrays = read_npz(path)
+    facts: dict[str, Any] = {"arrays": {name: f"{array.dtype} {tuple(array.shape)}" for name, array in arrays.items()}}
+    findings = [
+        finding
+        for name, array in arrays.items()
+        if array.dtype.kind == "f"
+        for finding in check_finite(array, f"array {name!r}")
+    ]
+    if not findings and {"rotations", "root", "joint_names", "parents", "offsets", "fps"} <= set(arrays):
+        return _with_motion(path, "motion npz", read_motion_npz(path), facts)
+    if not findings and "poses" in arrays and {"trans", "mocap_frame_rate"} <= set(arrays):
+        return _with_motion(path, "smplx npz", _smplx(path, arrays), facts)
+    return Inspected(str(path), "npz", facts, located(findings, path=str(path)))
+
+
+def _smplx(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
+    poses = float_array(arrays["poses"], ((55, 3), (165,)), f"{path}, poses")
+    trans = float_array(arrays["trans"], ((3,),), f"{path}, trans")
+    rate = arrays["mocap_frame_rate"]
+    if rate.size != 1 or rate.dtype.kind not in "iuf" or not 1 <= float(rate.reshape(-1)[0]) <= 1000:
+        raise InputError(f"{path}, mocap_frame_rate: expected frames a second, such as 30.")
+    turns = np.concatenate([poses[:, BODY], poses[:, HANDS]], axis=1)
+    return smplx_motion(turns, trans[: len(turns)], float(rate.reshape(-1)[0]), str(path))
+
+
+def inspect_together(first: Inspected, audio: Inspected) -> Inspected:
+    """A motion or a transcript with the audio that belongs to it.
+
+    Raises:
+        InputError: the first is neither, or the second no audio.
+    """
+    if audio.audio is None:
+        raise InputError(f"{audio.path}: is no audio; name a WAV or FLAC file with --audio.")
+    seconds = len(audio.audio) / SAMPLE_RATE
+    findings: list[Finding] = []
+    together: dict[str, Any] = {}
+    if first.motion is not None:
+        motion = first.motion
+        together["lengths (s)"] = {"motion": round(motion.seconds, 3), "audio": round(seconds, 3)}
+        findings = check_lengths(motion.frames, motion.fps, seconds)
+        if not findings and first.rig is not None:
+            offset = _offset(motion, first.rig, audio.audio)
+            together["offset"] = offset_text(offset)
+            findings = check_offset(offset)
+    elif first.words is not None:
+        findings = check_words(first.words, seconds)
+    else:
+        raise InputError(f"{first.path}: is neither a motion nor a transcript; --audio says nothing about it.")
+    facts = {**first.facts, "audio file": audio.facts["file"], "audio": audio.facts["audio"], "together": together}
+    facts["skeleton"] = facts.pop("skeleton", None)
+    facts = {name: section for name, section in facts.items() if section}
+    every = [*first.findings, *audio.findings, *located(findings, path=first.path)]
+    return Inspected(first.path, "pair", facts, every, first.motion, first.rig, audio.audio, first.words)
+
+
+def _offset(motion: Motion, rig: Rig, audio: Float[np.ndarray, " N"]) -> Offset | None:
+    seconds = min(motion.seconds, len(audio) / SAMPLE_RATE)
+    wrists = at_rate(wrist_places(motion, rig), motion.fps)
+    return measure_offset(energy_db(audio, SAMPLE_RATE, seconds), wrists)
+
+
+def offset_text(offset: Offset | None) -> str:
+    """A measured offset in words."""
+    if offset is None:
+        return "cannot be told (too short, or no speech or motion)"
+    height = f"{offset.deviations:.1f} standard deviations above chance; known from 5"
+    if not offset.known:
+        return f"cannot be told ({height})"
+    return f"motion {offset.seconds:+.2f} s against the speech ({height})"
+
+
+def check_words(words: tuple[Word, ...], audio_seconds: float) -> list[Finding]:
+    """A transcript against the length of the audio."""
+    late = [word for word in words if word.end > audio_seconds + _WORDS_BEYOND]
+    if not late:
+        return []
+    message = f"{len(late)} words lie after the end of the audio at {audio_seconds:.2f} s, the first {late[0].text!r}."
+    mend = "Is it the transcript of another take?"
+    return [Finding("warning", "words-beyond", message, mend, Place(seconds=late[0].start), float(len(late)))]

@@ -1,0 +1,69 @@
+"""What a check says: plain data, for printing and for JSON."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where something was found; what does not apply is left out."""
+
+    path: str = ""
+    recording: str = ""
+    joint: str = ""
+    frame: int | None = None
+    seconds: float | None = None
+
+    def __str__(self) -> str:
+        parts = [self.path, self.recording, self.joint and f"joint {self.joint}"]
+        if self.frame is not None:
+            parts.append(f"frame {self.frame}")
+        if self.seconds is not None:
+            parts.append(f"{self.seconds:.2f} s")
+        return ", ".join(part for part in parts if part)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing worth knowing."""
+
+    severity: Literal["warning", "info"]
+    """A warning is a fault, or so likely one that somebody should look; an info is a fact that may surprise."""
+    code: str
+    """Which check says it, such as ``"frozen"``; stable, for scripts."""
+    message: str
+    mend: str = ""
+    """What to do about it."""
+    place: Place = field(default_factory=Place)
+    value: float | None = None
+    """The measured number that the message speaks of."""
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values; the place without what does not apply."""
+        values = asdict(self)
+        values["place"] = {name: value for name, value in values["place"].items() if value not in ("", None)}
+        return values
+
+    def line(self) -> str:
+        """One line of text."""
+        where = f"{self.place}: " if str(self.place) else ""
+        return f"[{self.code}] {where}{self.message}{f' {self.mend}' if self.mend else ''}"
+
+
+def located(findings: Iterable[Finding], *, path: str = "", recording: str = "") -> list[Finding]:
+    """The findings with the file or the recording named that they are about, where they do not name one."""
+    return [
+        replace(
+            finding,
+            place=replace(
+                finding.place, path=finding.place.path or path, recording=finding.place.recording or recording
+            ),
+        )
+        for finding in findings
+    ]
+
+
+def warnings_of(findings: Iterable[Finding]) -> list[Finding]:
+    """The warnings among findings."""
+    return [finding for finding in findings if finding.severity == "warning"]

@@ -1,0 +1,92 @@
+"""What an inspection says, as one JSON document and as text."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from a2g_jax.inspection.finding import Finding, warnings_of
+
+FORMAT, VERSION = "a2g_jax inspection", 1
+#: Findings of one code that text shows in full; JSON has them all.
+_SHOWN = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """One inspected thing.
+
+    As JSON, stable within a version::
+
+        {"format": "a2g_jax inspection", "version": 1,
+         "path": ..., "kind": "bvh" | "audio" | "transcript" | "motion npz" | "smplx npz" | "npz" | "pair" | "folder"
+                              | "corpus" | "run",
+         "facts": {section: {name: number, text, list or further names}},
+         "findings": [{"severity": "warning" | "info", "code", "message", "mend", "value": number or null,
+                       "place": {"path", "recording", "joint", "frame", "seconds"} as far as they apply}]}
+    """
+
+    path: str
+    kind: str
+    facts: dict[str, Any]
+    """Sections of numbers, texts and lists; a section ``skeleton`` holds what :mod:`a2g_jax.inspection.tree` draws."""
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> int:
+        """How many warnings there are."""
+        return len(warnings_of(self.findings))
+
+    def to_json(self) -> dict[str, Any]:
+        """The document."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "path": self.path,
+            "kind": self.kind,
+            "facts": self.facts,
+            "findings": [finding.to_json() for finding in self.findings],
+        }
+
+    def text(self) -> str:
+        """For a terminal."""
+        from a2g_jax.inspection.tree import draw_tree
+
+        lines = [f"{self.path}: {self.kind}"]
+        for title, section in self.facts.items():
+            lines += ["", title]
+            if title == "skeleton":
+                lines += [f"  {line}" for line in draw_tree(section)]
+                section = {name: value for name, value in section.items() if name not in ("joints", "count")}
+            lines += _section(section)
+        return "\n".join([*lines, *self._findings()])
+
+    def _findings(self) -> list[str]:
+        lines = []
+        for severity, title in (("info", "notes"), ("warning", "warnings")):
+            chosen = [finding for finding in self.findings if finding.severity == severity]
+            if chosen:
+                lines += ["", f"{title} ({len(chosen)})"]
+            for code in dict.fromkeys(finding.code for finding in chosen):
+                same = [finding for finding in chosen if finding.code == code]
+                lines += [f"  {finding.line()}" for finding in same[:_SHOWN]]
+                if len(same) > _SHOWN:
+                    lines.append(f"  [{code}] and {len(same) - _SHOWN} more; --json lists them all")
+        return lines if self.warnings else [*lines, "", "no warnings"]
+
+
+def _section(section: dict[str, Any]) -> list[str]:
+    if not section:
+        return []
+    width = max(len(name) for name in section)
+    return [f"  {name.ljust(width)}  {_shown(value)}" for name, value in section.items()]
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}" if abs(value) < 1e6 else f"{value:.3e}"
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_shown(inner)}" for name, inner in value.items())
+    if isinstance(value, list | tuple):
+        if len(value) == 2 and all(isinstance(item, float) for item in value):
+            return f"{_shown(value[0])} to {_shown(value[1])}"
+        return ", ".join(_shown(item) for item in value)
+    return "-" if value is None else str(value)

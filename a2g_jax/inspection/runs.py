@@ -1,0 +1,109 @@
+"""Inspecting a run made by ``a2g train``."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from flax.traverse_util import flatten_dict
+
+from a2g_jax.inspection.finding import Finding
+from a2g_jax.inspection.report import Report
+from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.training.run import Run, load_run
+
+_METRICS = "metrics.jsonl"
+#: Times the best validation loss from which the last one has got worse and not merely fluctuates.
+_WORSE = 1.25
+
+
+def inspect_run(path: Path) -> Report:
+    """Model, settings, corpus, size and progress of a run.
+
+    Raises:
+        InputError: it is no run, or a damaged one.
+    """
+    run = load_run(path)
+    log = _metrics(path / _METRICS)
+    return Report(str(path), "run", run_facts(run, log), check_run(run, log))
+
+
+def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
+    """Training that has not ended, losses that are no numbers, validation that got worse."""
+    findings = []
+    asked = run.config.train_config.steps
+    if run.steps < asked:
+        message = f"{run.steps} of {asked} steps are done."
+        findings.append(
+            Finding("info", "unfinished", message, "'a2g train ... --resume' goes on.", value=run.steps / asked)
+        )
+    losses = [line.get("loss") for line in log if "loss" in line]
+    if None in losses:
+        message = f"{losses.count(None)} logged losses are no numbers."
+        findings.append(Finding("warning", "nan", message, "Lower the learning rate, or inspect the corpus."))
+    checked = [line["loss"] for line in log if line.get("split") == "validation" and line.get("loss") is not None]
+    # Losses below zero, as of likelihoods, have no ratio.
+    if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
+        message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
+        mend = "It learns its corpus by heart: train on more recordings, or for fewer steps."
+        findings.append(Finding("info", "overfitting", message, mend, value=checked[-1] / min(checked)))
+    return findings
+
+
+def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
+    """What a run is."""
+    config = run.config
+    sizes = {name: int(np.size(value)) for name, value in flatten_dict(run.params, sep="/").items()}
+    parts: dict[str, int] = {}
+    for name, size in sizes.items():
+        parts[name.split("/")[0]] = parts.get(name.split("/")[0], 0) + size
+    facts: dict[str, Any] = {
+        "run": {
+            "model": config.model,
+            "preset": config.preset,
+            "steps": run.steps,
+            "parameters": sum(sizes.values()),
+            "of which": parts,
+            "fps": config.fps,
+            "audio": f"{config.mel.width} values a frame at {config.mel.sample_rate} Hz",
+        },
+        "corpus": {
+            "fingerprint": config.corpus.get("fingerprint"),
+            "minutes": round(config.corpus.get("seconds", 0.0) / 60, 2),
+            "made by": {
+                name: value
+                for name, value in config.corpus.get("recipe", {}).items()
+                if name in ("reader", "source", "seed", "minutes")
+            },
+        },
+        "model settings": _plain(asdict(config.model_config)),
+        "training settings": _plain(asdict(config.train_config)),
+    }
+    last = {line["split"]: line for line in log if "split" in line}
+    if last:
+        facts["last losses"] = {
+            split: {name: value for name, value in line.items() if name != "split"} for split, line in last.items()
+        }
+    facts["skeleton"] = skeleton_facts(config.skeleton)
+    return facts
+
+
+def _plain(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def _metrics(path: Path) -> list[dict[str, Any]]:
+    """Lines of the log; what a kill cut short is left out."""
+    lines: list[dict[str, Any]] = []
+    if not path.is_file():
+        return lines
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for text in file:
+            try:
+                line = json.loads(text)
+            except ValueError:
+                continue
+            if isinstance(line, dict):
+                lines.append(line)
+    return lines

@@ -1,0 +1,50 @@
+"""A skeleton as a drawn tree."""
+
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.geometry.retarget.rig import Rig
+from a2g_jax.geometry.skeleton import Skeleton
+
+
+def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]:
+    """Joints with parents, bone lengths in centimetres and the parts of a body that were found."""
+    part_of: dict[int, str] = {}
+    facts: dict[str, Any] = {"count": skeleton.joints}
+    if rig is not None:
+        part_of = {joint: role for role, joint in rig.roles.items()}
+        for label, chain in (("Spine", rig.spine), ("Neck", rig.neck)):
+            for number, joint in enumerate(chain, start=1):
+                part_of.setdefault(joint, f"{label} {number}")
+        facts |= {"up": rig.up, "height (m)": round(rig.height * rig.unit_factor, 3), "found": list(rig.notes)}
+        facts["parts"] = f"{len(rig.roles)} by {'shape of the tree' if rig.by_shape else 'name'}"
+    lengths = 100 * np.linalg.norm(np.asarray(skeleton.offsets, np.float64), axis=1)
+    ends = {joint for joint, _ in skeleton.ends}
+    facts["joints"] = [
+        {"name": name, "parent": parent, "bone_cm": round(float(length), 2), "part": part_of.get(joint, ""),
+         "end": joint in ends}
+        for joint, (name, parent, length) in enumerate(zip(skeleton.names, skeleton.parents, lengths, strict=True))
+    ]  # fmt: skip
+    return facts
+
+
+def draw_tree(facts: dict[str, Any]) -> list[str]:
+    """One line a joint: the branch, the name, the length of its bone, the part of the body."""
+    joints = facts["joints"]
+    children: dict[int, list[int]] = {}
+    for joint, entry in enumerate(joints):
+        children.setdefault(entry["parent"], []).append(joint)
+    rows: list[tuple[str, str, str]] = []
+    stack = [(0, "", "", "")]
+    while stack:
+        joint, before, branch, indent = stack.pop()
+        entry = joints[joint]
+        length = f"{entry['bone_cm']:.1f} cm" if joint else ""
+        rows.append((before + branch + entry["name"], length, entry["part"]))
+        below = children.get(joint, [])
+        for number, child in reversed(list(enumerate(below))):
+            last = number == len(below) - 1
+            stack.append((child, indent, "└─ " if last else "├─ ", indent + ("   " if last else "│  ")))
+    width, numbers = max(len(row[0]) for row in rows), max(len(row[1]) for row in rows)
+    return [f"{name.ljust(width)}  {length.rjust(numbers)}  {part}".rstrip() for name, length, part in rows]
