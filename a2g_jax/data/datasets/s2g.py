@@ -11,9 +11,10 @@ would be in training and in test. Here the windows of an interval are joined int
 
 - They are put in the order of their times. Only every sixth or so is opened: the last one that still shares half of
   its frames with the one before.
-- Where the next window lies is the shift at which the frames that both have are equal, looked for first where the
-  times say. If there is none, the recording is refused.
-- Where windows are missing, a new recording begins (``<interval>-part2``); it shares no frame with the others.
+- The frames that both have must be equal where the times say (give or take one), else the recording is refused.
+- Where windows are missing, a new recording begins (``<interval>-part2``); it shares no frame with the others. So it
+  does where frames are missing: windows that last longer than others of their interval are left out, since poses and
+  speech would part there.
 - Audio is laid by the times; a recording has as much as the last window ends with, a frame less than the poses.
 
 Keypoints are 49, relative to point 0 (of 52, nose and eyes go, as in ``get_pose``); lost ones (NaN) are bridged for up
@@ -128,10 +129,13 @@ def _seconds(text: str) -> float | None:
 
 
 def _stretches(windows: list[_Window]) -> Iterable[list[_Window]]:
-    """Windows in the order of their times, apart where one begins after all before it have ended."""
+    """Windows without a jump in time, in order, apart where one begins after all before it have ended."""
     part: list[_Window] = []
     reached = 0.0
+    usual = min(window.end - window.start for window in windows)
     for window in windows:
+        if window.end - window.start > usual + 1.5 / FPS:
+            continue
         if part and window.start > reached + 0.5 / FPS:
             yield part
             part = []
@@ -165,9 +169,8 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
         start, end = times[number]
         following, speech = _read_window(path)
         guess = round((start - times[number - 1][0]) * (len(following) - 1) / (end - start))
-        # A few equal frames elsewhere may be chance: somebody stands still.
-        likely = range(1, max(len(pose) - 7, 2))
-        shift = _shift(pose, following, [guess, *sorted(likely, key=lambda shift: abs(shift - guess))])
+        # Times may be rounded.
+        shift = _shift(pose, following, (guess, guess + 1, guess - 1))
         if shift is None:
             raise InputError(
                 f"{path}: is no continuation of {before}, whose frames it should share; extract this interval anew."

@@ -19,15 +19,16 @@ def made_up_interval(frames, points=49, rate=15.0, seed=0):
     return poses, rng.uniform(-0.5, 0.5, int((frames - 1) / rate * SPEECH_RATE)).astype(np.float32)
 
 
-def write_interval(root, speaker, interval, poses, audio, begin, part="train", rate=15.0, without=()):
-    """Windows of 64 frames, 5 apart; returns the rows of ``train.csv``."""
+def write_interval(root, speaker, interval, poses, audio, begin, part="train", rate=15.0, without=(), jump=None):
+    """Windows of 64 frames, 5 apart; returns the rows of ``train.csv``. From frame ``jump`` on, times are 1 s later."""
     folder = root / speaker / "train" / "npz"
     folder.mkdir(parents=True, exist_ok=True)
     rows = []
     for first in range(0, len(poses) - 64, 5):
         if first in without:
             continue
-        start, end = begin + first / rate, begin + (first + 63) / rate
+        late = [0.0 if jump is None or frame < jump else 1.0 for frame in (first, first + 63)]
+        start, end = begin + first / rate + late[0], begin + (first + 63) / rate + late[1]
         name = f"{interval}-{stamp(start)}-{stamp(end)}.npz"
         sound = audio[int(round(first / rate * SPEECH_RATE, 3)) : int(round((first + 63) / rate * SPEECH_RATE, 3))]
         np.savez(folder / name, pose=poses[first : first + 64], imgs=np.array(["a.jpg"] * 64), audio=sound)

@@ -86,14 +86,27 @@ def test_no_frame_is_in_two_recordings(tmp_path):
 
 
 def test_times_that_jump_within_an_interval(tmp_path):
-    """Frames without a pose are missing in the videos, so that times say another shift than frames do."""
+    """A second of frames is missing in the video: the windows across it are left out."""
+    poses, audio = made_up_interval(400)
+    write_table(tmp_path, write_interval(tmp_path, "oliver", "7", poses, audio, 5.0, jump=120))
+    first, second = (DATASET.read(take, 16000).motion for take in DATASET.find(tmp_path))
+    np.testing.assert_array_equal(first.values, relative(poses)[: 55 + 64].astype(np.float32))
+    np.testing.assert_array_equal(second.values, relative(poses)[120 : covered(400)].astype(np.float32))
+    assert first.fps == second.fps == 15.0
+
+
+def test_other_rates_and_rounded_times(tmp_path):
     poses, audio = made_up_interval(160)
-    rows = write_interval(tmp_path, "oliver", "7", poses, audio, 5.0, rate=14.0)
-    write_table(tmp_path, rows)
-    (take,) = DATASET.find(tmp_path)
-    found = DATASET.read(take, 16000)
+    rows = write_interval(tmp_path / "a", "oliver", "7", poses, audio, 5.0, rate=14.0)
+    write_table(tmp_path / "a", rows)
+    found = DATASET.read(DATASET.find(tmp_path / "a")[0], 16000)
     np.testing.assert_array_equal(found.motion.values, relative(poses)[: covered(160)].astype(np.float32))
     assert found.motion.fps == pytest.approx(14.0, rel=1e-3)
+    rows = write_interval(tmp_path / "b", "oliver", "7", poses, audio, 5.0)
+    # Tenths of a second: 00:00:05.3 for 00:00:05.333333.
+    write_table(tmp_path / "b", [{**row, "start": row["start"][:-5], "end": row["end"][:-5]} for row in rows])
+    found = DATASET.read(DATASET.find(tmp_path / "b")[0], 16000)
+    np.testing.assert_array_equal(found.motion.values, relative(poses)[: covered(160)].astype(np.float32))
 
 
 def test_gaps_are_bridged_and_long_ones_refused(tmp_path):

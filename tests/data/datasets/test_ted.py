@@ -48,6 +48,14 @@ def test_what_was_written_is_read(tmp_path, data_set, layout, prefix):
     assert len(data_set.read(takes[0], 8000).audio) == 16000
 
 
+def test_names_are_unique(tmp_path):
+    """The same clip twice, and a name that no file could have."""
+    write_videos(tmp_path, [{"vid": "a/../b", "clips": [CLIP, CLIP]}])
+    takes = ted.DATASET.find(tmp_path)
+    assert [take.name for take in takes] == ["a____b_186_216", "a____b_186_216-2"]
+    assert takes[1].spec["clip"] == 1
+
+
 def test_one_database_alone(tmp_path):
     write_ted(tmp_path, 10)
     assert {take.split for take in ted.DATASET.find(tmp_path / "lmdb_val")} == {"validation"}
