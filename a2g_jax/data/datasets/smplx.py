@@ -21,6 +21,8 @@ BODY, FACE, HANDS = slice(0, 22), slice(22, 25), slice(25, 55)
 PELVIS_AT_REST = (0.0, -0.35, 0.0)
 #: Longest rotation vector that is one: several turns are a sign of degrees.
 _LARGEST_TURN = 4.0 * np.pi
+#: Metres from the origin beyond which a translation is in another unit.
+_FARTHEST = 1000.0
 
 
 def smplx_motion(
@@ -34,7 +36,7 @@ def smplx_motion(
         place: what errors name.
 
     Raises:
-        InputError: no frames, numbers that are not finite, or angles that are no radians.
+        InputError: no frames, numbers that are not finite, or angles or places in other units.
     """
     if len(rotations) == 0:
         raise InputError(f"{place}: holds no frames; leave this recording out.")
@@ -42,7 +44,13 @@ def smplx_motion(
         finite = np.isfinite(values).reshape(len(values), -1).all(axis=1)
         if not finite.all():
             raise InputError(f"{place}, frame {np.argmin(finite)}: NaN or infinity in the {name}; leave it out.")
-    angles = np.linalg.norm(rotations, axis=-1)
+    far = np.abs(translation).max(axis=1)
+    if far.max() > _FARTHEST:
+        raise InputError(
+            f"{place}, frame {np.argmax(far)}: the translation is {far.max():.4g}; expected metres, up to {_FARTHEST}."
+        )
+    with np.errstate(over="ignore"):
+        angles = np.linalg.norm(rotations, axis=-1)
     if angles.max() > _LARGEST_TURN:
         frame = int(np.argmax(angles.max(axis=1)))
         raise InputError(

@@ -81,6 +81,7 @@ def test_without_a_table_there_is_no_split(tree):
         ({"poses": np.zeros((45, 156))}, r"poses: expected numbers of shape \(T, 55, 3\) or \(T, 165\); got"),
         ({"poses": np.zeros((45, 165)) + [np.nan] * 165}, "frame 0: NaN"),
         ({"poses": np.full((45, 165), 90.0)}, "radians"),
+        ({"trans": np.full((45, 3), 1e4)}, "frame 0: the translation is 1e.04; expected metres"),
         ({"poses": np.zeros((0, 165)), "trans": np.zeros((0, 3))}, "no frames"),
         ({"trans": np.zeros((44, 3))}, "trans: has 44 frames"),
         ({"mocap_frame_rate": np.array(0)}, "mocap_frame_rate"),
