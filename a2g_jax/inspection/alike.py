@@ -17,7 +17,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.inspection.finding import Finding, Place
 
 #: Words a second, of audio and of motion.
-AUDIO_RATE, MOTION_RATE = 50.0, 10.0
+AUDIO_RATE, MOTION_RATE = 50.0, 20.0
 #: Windows of 0.26 s, long against the 10 ms that a copy cut elsewhere can be off the frames.
 _MEL = MelConfig(window=4096, bands=33, level_db=None, low_hz=300.0, high_hz=4000.0)
 #: A word that occurs more often is silence or rest and tells nothing.
@@ -28,8 +28,8 @@ _AGREEING = 24
 _DENSE = 0.1
 #: A pose changes by less than this share of its usual change while it rests; signs are noise then.
 _RESTING = 0.2
-#: Seconds over which energies are compared.
-_APART = 0.1
+#: Seconds over which energies, and poses, are compared.
+_APART, _POSES_APART = 0.1, 0.2
 _BITS = (np.uint32(1) << np.arange(32, dtype=np.uint32)).astype(np.uint32)
 
 
@@ -103,7 +103,8 @@ def poses_print(poses: Float[np.ndarray, "T F"], fps: float) -> Print:
     high = np.minimum(low + 1, len(poses) - 1)
     weight = (where - low)[:, None].astype(np.float32)
     at = poses[low] * (1 - weight) + poses[high] * weight
-    change = at[2:] - at[:-2]
+    apart = round(_POSES_APART * MOTION_RATE)
+    change = at[apart:] - at[:-apart]
     directions = np.random.default_rng(2002).normal(size=(poses.shape[1], 32)).astype(np.float32)
     size = np.linalg.norm(change, axis=1)
     moving = size > _RESTING * np.sqrt(np.mean(size**2)) if len(size) else np.zeros(0, bool)

@@ -18,7 +18,7 @@ from a2g_jax.inspection.describe import try_rig
 from a2g_jax.inspection.finding import Finding, Place, located
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.report import Report
-from a2g_jax.inspection.sync import at_rate, check_offset, measure_offset, wrist_places
+from a2g_jax.inspection.sync import Offset, at_rate, check_offset, measure_offset, wrist_places
 from a2g_jax.inspection.tree import skeleton_facts
 from a2g_jax.progress import progress_bar
 
@@ -36,6 +36,7 @@ def inspect_corpus(path: Path) -> Report:
     findings = check_overlaps(corpus) + check_sources(corpus) + check_statistics(corpus)
     heard: list[Print] = []
     seen: list[Print] = []
+    offsets: list[Offset] = []
     rig: Rig | None = None
     with progress_bar(len(corpus.recordings), "inspecting", "recording") as bar:
         for entry, audio, pose, root in _rows(corpus):
@@ -46,7 +47,10 @@ def inspect_corpus(path: Path) -> Report:
                 motion = corpus.motion(entry.first, entry.first + entry.frames)
                 if rig is None:
                     rig = try_rig(motion, str(path))[0]
-                faults = _motion_faults(motion, rig, audio[:, : corpus.mel.bands])
+                faults = check_motion(motion, rig)
+                if rig is not None and (offset := _offset(motion, rig, audio[:, : corpus.mel.bands])) is not None:
+                    offsets.append(offset)
+                    faults += check_offset(offset)
             if entry.samples:
                 samples = corpus.waveform[entry.first_sample : entry.first_sample + entry.samples]
                 faults += check_audio(samples.astype(np.float32) / 32768, corpus.mel.sample_rate)
@@ -54,7 +58,11 @@ def inspect_corpus(path: Path) -> Report:
             bar.update()
     names, parts = [entry.name for entry in corpus.recordings], _splits_of(corpus)
     findings += check_copies("audio", heard, names, parts) + check_copies("motion", seen, names, parts)
-    return Report(str(path), "corpus", corpus_facts(corpus, rig), findings)
+    facts = corpus_facts(corpus, rig)
+    if known := [offset.seconds for offset in offsets if offset.known]:
+        median = round(float(np.median(known)), 3)
+        facts["offset"] = {"told in": f"{len(known)} of {len(names)} recordings", "motion is late by (s)": median}
+    return Report(str(path), "corpus", facts, findings)
 
 
 def _rows(corpus: Corpus) -> Iterator[tuple[Entry, np.ndarray, np.ndarray, np.ndarray]]:
@@ -63,14 +71,9 @@ def _rows(corpus: Corpus) -> Iterator[tuple[Entry, np.ndarray, np.ndarray, np.nd
         yield entry, np.asarray(corpus.audio[rows]), np.asarray(corpus.pose[rows]), np.asarray(corpus.root[rows])
 
 
-def _motion_faults(motion: Motion, rig: Rig | None, bands: Float[np.ndarray, "T B"]) -> list[Finding]:
-    faults = check_motion(motion, rig)
-    if rig is not None:
-        energy = 10 * np.log10(np.sum(10 ** (bands.astype(np.float64) / 10), axis=1))
-        faults += check_offset(
-            measure_offset(at_rate(energy, motion.fps), at_rate(wrist_places(motion, rig), motion.fps))
-        )
-    return faults
+def _offset(motion: Motion, rig: Rig, bands: Float[np.ndarray, "T B"]) -> Offset | None:
+    energy = 10 * np.log10(np.sum(10 ** (bands.astype(np.float64) / 10), axis=1))
+    return measure_offset(at_rate(energy, motion.fps), at_rate(wrist_places(motion, rig), motion.fps))
 
 
 def _splits_of(corpus: Corpus) -> list[frozenset[str]]:

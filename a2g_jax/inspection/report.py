@@ -66,8 +66,14 @@ class Report:
             if chosen:
                 lines += ["", f"{title} ({len(chosen)})"]
             for code in dict.fromkeys(finding.code for finding in chosen):
-                same = [finding for finding in chosen if finding.code == code]
-                lines += [f"  {finding.line()}" for finding in same[:_SHOWN]]
+                groups: dict[tuple[str, str], list[Finding]] = {}
+                for finding in (finding for finding in chosen if finding.code == code):
+                    groups.setdefault((finding.message, finding.mend), []).append(finding)
+                same = [
+                    first.line() + (f" (The same in {len(more)} more places.)" if more else "")
+                    for first, *more in groups.values()
+                ]
+                lines += [f"  {line}" for line in same[:_SHOWN]]
                 if len(same) > _SHOWN:
                     lines.append(f"  [{code}] and {len(same) - _SHOWN} more; --json lists them all")
         return lines if self.warnings else [*lines, "", "no warnings"]

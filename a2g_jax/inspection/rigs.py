@@ -39,6 +39,14 @@ def check_skeletons(
             mend = "Retarget it, or prepare the 22 body joints only."
             findings.append(Finding("warning", "skeleton", message, mend, Place(recording=name)))
     alike = [at for at, one in enumerate(skeletons) if (one.names, one.parents) == usual]
+    sizes = [float(np.linalg.norm(np.asarray(skeletons[at].offsets)[1:], axis=1).sum()) for at in alike]
+    for at, size in zip(list(alike), sizes, strict=True):
+        ratio = size / max(float(np.median(sizes)), 1e-9)
+        if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+            alike.remove(at)
+            message = f"is {ratio:.3g} times as large as the usual skeleton here."
+            mend = "Is it in another unit? Say which when you read it (read_bvh's scale)."
+            findings.append(Finding("warning", "unit", message, mend, Place(recording=names[at]), ratio))
     return findings + _offsets(
         [skeletons[at] for at in alike],
         [names[at] for at in alike],
@@ -54,8 +62,10 @@ def _difference(skeleton: Skeleton, usual: tuple[str, ...]) -> str:
 
 
 def _offsets(skeletons: Sequence[Skeleton], names: Sequence[str], speakers: Sequence[str]) -> list[Finding]:
+    if len(skeletons) < 2:
+        return []
     offsets = np.stack([np.asarray(one.offsets, np.float64)[1:] for one in skeletons])
-    if len(offsets) < 2 or offsets.shape[1] == 0:
+    if offsets.shape[1] == 0:
         return []
     joints = skeletons[0].names[1:]
     lengths = np.linalg.norm(offsets, axis=-1)
@@ -65,11 +75,6 @@ def _offsets(skeletons: Sequence[Skeleton], names: Sequence[str], speakers: Sequ
     long = np.linalg.norm(middle, axis=-1) > _SHORT * size / 4
     findings = []
     for at, name in enumerate(names):
-        ratio = float(sizes[at] / max(size, 1e-9))
-        if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
-            message = f"is {ratio:.3g} times as large as the usual skeleton here."
-            mend = "Is it in another unit? Say which when you read it (read_bvh's scale)."
-            findings.append(Finding("warning", "unit", message, mend, Place(recording=name), ratio))
         angles = np.where(long & (lengths[at] > 1e-6), angle_between(offsets[at], middle), 0.0)
         worst = int(np.argmax(angles))
         if angles[worst] > REST_ANGLE:
