@@ -2,7 +2,9 @@
 
 Layout: the README of the 2023 data (github.com/genea-workshop/genea_challenge_2023, ``dataset``), and for 2022
 ``process_data.py`` of the IVI Lab's entry. Words are those of the TSV files, where an entry may be several words; a
-file without any means that the speaker says nothing.
+file without any means that the speaker says nothing. The root joint is ``body_world``, which carries the path of the
+body (the challenges' visualizer copies the place of no other joint); every other joint has a position too, which
+:func:`~a2g_jax.io.bvh.read_bvh` takes for its bone.
 """
 
 import re

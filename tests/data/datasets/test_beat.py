@@ -4,9 +4,12 @@ import shutil
 import numpy as np
 import pytest
 from bvh_trees import TREES, check_motion, check_sound, put, tree, write_motion, write_sound
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from a2g_jax.data.datasets import beat
 from a2g_jax.data.datasets.beat_split import Part, parts
+from a2g_jax.data.datasets.beat_take import describe_face, emotion, read_emotions, read_semantics
 from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.io.textgrid import write_words
@@ -35,7 +38,8 @@ def test_a_take_is_what_was_written(tmp_path):
     motion, sound = write_take(root, "2_scott_0_81_81")
     put(root / ".DS_Store", b"\0")
     put(root / "2" / "Thumbs.db", b"\0")
-    put(root / "2" / "._2_scott_0_81_81.bvh", b"\0")
+    for hidden in (".trash", "__MACOSX"):
+        put(root / hidden / "2_scott_0_81_81.bvh", b"\0")
     assert len(motion.names) == 75
     for folder in (root, tmp_path, root / "2"):
         (take,) = beat.find(folder)
@@ -103,6 +107,35 @@ def test_halves_are_cut_at_thirty_seconds(tmp_path):
     assert second.words == (Word("b", 0.0, 0.5),)
     assert [(e["start"], e["end"]) for e in second.annotations["semantic"]] == [(0.0, 1.0)]
     assert (second.name, second.emotion, second.annotations["face"]["offset"]) == (takes[1].name, "happiness", 30.0)
+
+
+def test_emotions_by_sequence_number():
+    edges = {0: "neutral", 64: "neutral", 65: "happiness", 72: "happiness", 73: "anger", 80: "anger", 86: "sadness"}
+    edges |= {94: "contempt", 102: "surprise", 110: "fear", 111: "disgust", 118: "disgust", 119: ""}
+    assert {number: emotion(0, number, number) for number in edges} == edges
+    assert (emotion(6, 1, 8), emotion(0, 64, 65), emotion(1, 1, 1)) == ("neutral", "", "")
+
+
+def test_frames_of_a_face_are_counted_wherever_they_lie(tmp_path):
+    block = 2**20
+    for gap in range(11):
+        text = b" " * (block - gap) + b'"weights": []' + b" " * block + b'"weights"'
+        assert describe_face(put(tmp_path / "face.json", text), 0.0)["frames"] == 2
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.one_of(st.binary(max_size=60), st.text('0129.-e,\t\r\n "x', max_size=60).map(str.encode)))
+def test_any_table_is_read_or_refused(tmp_path_factory, content):
+    path = put(tmp_path_factory.getbasetemp() / "labels.csv", content)
+    for read in (read_emotions, read_semantics):
+        labels, refusal = [], str(path)
+        try:
+            labels = read(path)
+        except InputError as error:
+            refusal = str(error)
+        assert str(path) in refusal
+        assert all(0 <= label["start"] <= label["end"] for label in labels)
+        json.dumps(labels, allow_nan=False)
 
 
 def test_split_is_that_of_the_readme():
@@ -175,7 +208,7 @@ def test_links_that_lead_in_a_circle(tmp_path):
 @pytest.mark.parametrize(
     ("suffix", "content", "message"),
     [
-        ("csv", "00_neutral,0,2", r"\.csv, line 1: expected name, start, end, duration and score; got 3"),
+        ("csv", "00_neutral,0,2,2", r"\.csv, line 1: expected name, start, end, duration and score; got 4"),
         ("csv", "\n00_neutral,0,x,2,0", r"\.csv, line 2: expected a number; got 'x'"),
         ("csv", "00_neutral,0,2,2,9", "line 1: expected a score of 0 to 7; got 9"),
         ("csv", "00_neutral,2,1,1,0", "line 1: expected rising times"),

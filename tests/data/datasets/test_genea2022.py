@@ -27,7 +27,7 @@ def write_release(root, test_motion=True, seconds=2.0):
 
 def test_recordings_are_what_was_written(tmp_path):
     written = write_release(tmp_path / "dataset_v1")
-    put(tmp_path / "dataset_v1" / ".DS_Store", b"\0")
+    put(tmp_path / "dataset_v1" / "trn" / "._trn_2022_v1_metadata.csv", b"\0")
     for folder in (tmp_path, tmp_path / "dataset_v1"):
         takes = genea2022.find(folder)
         assert [(take.name, take.split) for take in takes] == [
