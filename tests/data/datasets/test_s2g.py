@@ -102,7 +102,7 @@ def test_other_rates_and_rounded_times(tmp_path):
     found = DATASET.read(DATASET.find(tmp_path / "a")[0], 16000)
     np.testing.assert_array_equal(found.motion.values, relative(poses)[: covered(160)].astype(np.float32))
     assert found.motion.fps == pytest.approx(14.0, rel=1e-3)
-    rows = write_interval(tmp_path / "b", "oliver", "7", poses, audio, 5.0)
+    rows = write_interval(tmp_path / "b", "oliver", "7", poses, audio, 5.07)
     # Tenths of a second: 00:00:05.3 for 00:00:05.333333.
     write_table(tmp_path / "b", [{**row, "start": row["start"][:-5], "end": row["end"][:-5]} for row in rows])
     found = DATASET.read(DATASET.find(tmp_path / "b")[0], 16000)
