@@ -1,5 +1,6 @@
 """What the tests of hostile input share: payloads by real writers, and a look at what a decoder did."""
 
+import codecs
 import sys
 import tarfile
 from collections.abc import Callable
@@ -21,6 +22,9 @@ def _listen(event: str, arguments: tuple) -> None:
         _seen.append(f"{event} {arguments!r:.200}")
 
 
+# Python loads these when they are first used, which is no deed of the data.
+for _codec in ("ascii", "latin-1", "raw-unicode-escape", "utf-8"):
+    codecs.lookup(_codec)
 sys.addaudithook(_listen)
 
 
@@ -47,6 +51,24 @@ def attempt(decode: Callable[..., Any], data: bytes) -> Any:
         return error
     assert_plain(value)
     return value
+
+
+def check_message(error: InputError, path: Path) -> None:
+    """A message is one line that begins with the file."""
+    message = str(error)
+    assert message.startswith(str(path))
+    assert "\n" not in message
+    assert len(message) < 400 + len(str(path))
+
+
+class Calls:
+    """Pickles as a call of any function with any arguments."""
+
+    def __init__(self, function: Callable, *arguments: Any) -> None:
+        self.function, self.arguments = function, arguments
+
+    def __reduce__(self) -> tuple:
+        return self.function, self.arguments
 
 
 def assert_plain(value: Any, depth: int = 0) -> None:

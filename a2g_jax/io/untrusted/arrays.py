@@ -7,7 +7,7 @@ import numpy as np
 
 from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
 
-_TYPE = re.compile(r"[<>=|]?(?:\?|b1|[iu][1248]|f[248]|c(?:8|16)|[SU][1-9][0-9]{0,8})")
+_TYPE = re.compile(r"[<>=|]?(?:\?|b1|[iu][1248]|f[248]|c(?:8|16)|[SU][1-9][0-9]{0,6})")
 _OBJECTS = re.compile(r"\|?O8?")
 _MOST_AXES = 32
 

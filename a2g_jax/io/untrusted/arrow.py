@@ -9,6 +9,7 @@ Source: ``cpp/src/arrow/python/serialize.cc`` and ``deserialize.cc`` of Apache A
 0.11.1, 0.13.0, 0.14.1, 0.15.1, 0.16.0, 0.17.1, 1.0.1, 6.0.1, 8.0.0 and 11.0.0.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,10 @@ from a2g_jax.io.untrusted.values import check_key, check_value
 
 _TENSORS_FROM = 64
 _MOST_BLOBS = 2**20
+#: What the elements of an array are of, by the kind of its type, where it was written as a list.
+_ELEMENTS: dict[str, tuple[type, ...]] = {
+    "b": (bool,), "i": (int,), "u": (int,), "f": (int, float), "c": (), "S": (bytes,), "U": (str,),
+}  # fmt: skip
 
 
 def decode_arrow(data: bytes, name: str, limits: Limits | None = None) -> Any:
@@ -198,8 +203,12 @@ class _Values:
             return plain_array(content.tobytes(), dtype, shape, "C", self.budget, self.at)
         if dtype.hasobject:
             return object_array(content, (len(content),), "C", self.budget, self.at)
-        values = np.array(content, dtype=object)
-        self.budget.charge(values.size * dtype.itemsize, self.at)
-        if any(type(value) not in (bool, int, float, str, bytes) for value in values.ravel().tolist()):
+        shape, flat = (len(content),), content
+        while flat and all(type(part) is list and len(part) == len(flat[0]) for part in flat):
+            shape = check_shape((*shape, len(flat[0])), self.budget, self.at)
+            self.budget.charge(16 * math.prod(shape), self.at)
+            flat = [value for part in flat for value in part]
+        if any(type(value) not in _ELEMENTS[dtype.kind] for value in flat):
             raise self.budget.damage(self.at, "an array's elements do not fit its type")
-        return values.astype(dtype)
+        self.budget.charge(len(flat) * dtype.itemsize, self.at)
+        return np.array(flat, dtype).reshape(shape)

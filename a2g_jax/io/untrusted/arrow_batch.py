@@ -111,7 +111,9 @@ class BatchReader:
         return self.body[start : start + (length if size is None else size)]
 
     def numbers(self, dtype: str, count: int) -> np.ndarray:
-        return np.frombuffer(self.buffer(count * np.dtype(dtype).itemsize), dtype)
+        data = self.buffer(count * np.dtype(dtype).itemsize)
+        self.budget.charge(len(data), self.at)  # columns may share a buffer, and each is looked through
+        return np.frombuffer(data, dtype)
 
     def bits(self, count: int, packed: memoryview | None = None) -> np.ndarray:
         packed = self.buffer((count + 7) // 8) if packed is None else packed

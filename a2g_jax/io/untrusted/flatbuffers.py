@@ -8,6 +8,8 @@ import struct
 
 from a2g_jax.io.untrusted.budget import Budget
 
+_LONGEST_NAME = 256
+
 
 class FlatData:
     """The bytes of one FlatBuffers message, which begin at byte ``base`` of the data that errors speak of."""
@@ -67,6 +69,8 @@ class Table:
 
     def text(self, field: int) -> str:
         start, count = self.vector(field, 1)
+        if count > _LONGEST_NAME:  # many fields may point at one name, and each reads it
+            raise self.flat.budget.damage(self.flat.base, f"a name of {count} bytes")
         try:
             return bytes(self.flat.data[start : start + count]).decode("utf-8")
         except UnicodeDecodeError:

@@ -123,7 +123,9 @@ class LmdbFile:
             self._fail("is not an LMDB database (version 1, 64-bit, little-endian); expected the data.mdb of one.")
         self._page_size = first[1]
         second = self._meta(self._page_size)
-        newest = max(meta for meta in (first, second) if meta is not None and meta[1] == self._page_size)
+        if second is None or second[1] != self._page_size:
+            self._damaged(1, "expected the second of two start pages")
+        newest = max(first, second)
         _, _, self._last, tree = newest
         _, flags, self._depth, _, _, _, self._entries, self._root = _TREE.unpack(tree)
         for flag, name in _FLAGS.items():
@@ -146,7 +148,7 @@ class LmdbFile:
         return transaction, size, last, main
 
     def _page(self, number: int, level: int) -> _Page:
-        """A page of the tree, its nodes and keys within it."""
+        """A page of the tree, its nodes and keys within it, none over another."""
         if not 2 <= number <= self._last:
             self._damaged(number, f"it lies outside of 2 to {self._last}")
         data = self._read(number * self._page_size, self._page_size)
@@ -160,14 +162,18 @@ class LmdbFile:
         if not count > 0 or not lower <= upper <= self._page_size:
             self._damaged(number, "its header says nothing sensible")
         nodes = struct.unpack_from(f"<{count}H", data, _HEADER.size)
-        keys = []
+        keys, room = [], self._page_size - upper
         for node in nodes:
             if not upper <= node <= self._page_size - _NODE.size:
                 self._damaged(number, "an entry lies outside of it")
+            low, high, kind, length = _NODE.unpack_from(data, node)
             start = node + _NODE.size
-            end = start + _NODE.unpack_from(data, node)[3]
-            if end > self._page_size:
-                self._damaged(number, "a key reaches out of it")
+            end = start + length
+            room -= _NODE.size + length
+            if expected == _LEAF:
+                room -= 8 if kind & _BIG else low | high << 16
+            if end > self._page_size or room < 0:
+                self._damaged(number, "its entries reach out of it or overlap")
             keys.append(data[start:end])
         return _Page(number, data, nodes, tuple(keys))
 

@@ -24,8 +24,8 @@ from a2g_jax.io.untrusted.pickles import decode_with
 
 _MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
-#: Largest piece read at once, other than an array: a list of members of more is no archive of arrays.
-_LARGEST_READ = 8 * 2**20
+#: Largest piece read at once: a list of members of more is no archive of arrays.
+_LARGEST_READ = 2**20
 _ITEM = r"'descr': *+'([^']{1,15})'|'fortran_order': *+(True|False)|'shape': *+\(([0-9L, ]{0,999})\)"
 _HEADER = re.compile(rf"\{{ *+(?:(?:{_ITEM}),? *+){{3}}\}}")
 _SIZE = re.compile(r"[0-9]{1,18}L?")
@@ -96,9 +96,11 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whol
     whole.charge(info.file_size, info.header_offset)
     try:
         with archive.open(info) as file:
-            data = file.read(info.file_size)
-            if len(data) != info.file_size or file.read(1):
-                raise EOFError("it is shorter or longer than announced")
+            data = bytearray()
+            while piece := file.read(_LARGEST_READ // 2):  # never more than there is, whatever is announced
+                data += piece
+            if len(data) != info.file_size:
+                raise EOFError("it is shorter than announced")
     except _DAMAGE as error:
         raise InputError(f"{name}: is damaged ({_reason(error)}); copy or download it again.") from None
     budget = Budget(name, whole.limits)
@@ -108,7 +110,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whol
     return array
 
 
-def _array(data: bytes, objects: bool, budget: Budget) -> np.ndarray:
+def _array(data: bytes | bytearray, objects: bool, budget: Budget) -> np.ndarray:
     dtype, shape, fortran, start = _header(data, budget)
     content = memoryview(data)[start:]
     if not dtype.hasobject:
@@ -121,7 +123,7 @@ def _array(data: bytes, objects: bool, budget: Budget) -> np.ndarray:
     return array
 
 
-def _header(data: bytes, budget: Budget) -> tuple[np.dtype, tuple[int, ...], bool, int]:
+def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[int, ...], bool, int]:
     """Type, shape, whether the first axis runs fastest, and where the content begins."""
     if data[:6] != _MAGIC or len(data) < 12:
         raise budget.error(0, "is not a NumPy array; expected one as numpy.save writes.")

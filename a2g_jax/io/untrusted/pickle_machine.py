@@ -75,10 +75,12 @@ class PickleMachine:
             return self.damage(f"no pickle has an opcode {code:#04x}")
         return self.budget.error(self.at, f"holds {what}, which is refused, and nothing was run; {CONVERT}.")
 
-    def take(self, count: int) -> bytes:
+    def take(self, count: int, cost: int = 0) -> bytes:
+        """The next ``count`` bytes, each of which counts for ``cost`` bytes of memory."""
         end = self.position + count
         if count < 0 or end > len(self.data):
             raise self.damage(f"{count} bytes are announced and {len(self.data) - self.position} are left")
+        self.budget.charge(cost * count, self.at)
         part = self.data[self.position : end]
         self.position = end
         return part
@@ -129,14 +131,14 @@ class PickleMachine:
             check_key(item, target, self.budget, self.at)
             target.add(item)
 
-    def text(self, raw: bytes) -> None:
-        self.push(raw.decode("utf-8"), _SMALL + 4 * len(raw))
+    def text(self, format: str) -> None:
+        self.push(self.take(self.number(format), 4).decode("utf-8"))
 
-    def blob(self, raw: bytes | bytearray) -> None:
-        self.push(raw, _SMALL + len(raw))
+    def blob(self, format: str) -> None:
+        self.push(self.take(self.number(format), 1))
 
     def old_text(self, raw: bytes) -> None:
-        self.push(raw.decode("ascii") if raw.isascii() else raw, _SMALL + len(raw))
+        self.push(raw.decode("ascii") if raw.isascii() else raw)
 
     def remember(self, key: int) -> None:
         if not self.stack:
@@ -304,16 +306,16 @@ _ACTIONS: dict[int, Callable[[PickleMachine], None]] = {
         "G": lambda m: m.push(m.number(">d")),
         # Text and bytes.
         "S": PickleMachine.quoted,
-        "T": lambda m: m.old_text(m.take(m.number("<i"))),
-        "U": lambda m: m.old_text(m.take(m.number("<B"))),
+        "T": lambda m: m.old_text(m.take(m.number("<i"), 2)),
+        "U": lambda m: m.old_text(m.take(m.number("<B"), 2)),
         "V": PickleMachine.escaped,
-        "X": lambda m: m.text(m.take(m.number("<I"))),
-        "\x8c": lambda m: m.text(m.take(m.number("<B"))),
-        "\x8d": lambda m: m.text(m.take(m.number("<Q"))),
-        "B": lambda m: m.blob(m.take(m.number("<I"))),
-        "C": lambda m: m.blob(m.take(m.number("<B"))),
-        "\x8e": lambda m: m.blob(m.take(m.number("<Q"))),
-        "\x96": lambda m: m.blob(bytearray(m.take(m.number("<Q")))),
+        "X": lambda m: m.text("<I"),
+        "\x8c": lambda m: m.text("<B"),
+        "\x8d": lambda m: m.text("<Q"),
+        "B": lambda m: m.blob("<I"),
+        "C": lambda m: m.blob("<B"),
+        "\x8e": lambda m: m.blob("<Q"),
+        "\x96": lambda m: m.push(bytearray(m.take(m.number("<Q"), 2))),
         # Containers.
         "(": PickleMachine.mark,
         "]": lambda m: m.push([], _CONTAINER),

@@ -16,6 +16,8 @@ _NUMPY_KEYS = (np.bool_, np.integer, np.floating, np.str_, np.bytes_)
 #: A tuple's hash can be steered by whoever wrote the file, so that each look-up meets all others.
 _MOST_TUPLE_KEYS = 4096
 _LONGEST_TUPLE_KEY = 16
+#: Bytes that meeting one other tuple counts for: what bounds the memory bounds the look-ups of all dictionaries.
+_TUPLE_KEY = 32
 
 
 def check_value(value: Any, budget: Budget, at: int) -> None:
@@ -69,6 +71,7 @@ def check_key(key: Any, owner: dict | set | list, budget: Budget, at: int) -> No
     if type(key) is tuple:
         if len(key) > _LONGEST_TUPLE_KEY or len(owner) > _MOST_TUPLE_KEYS:
             raise budget.error(at, f"has too many or too long tuples as keys; {CONVERT}.")
+        budget.charge(_TUPLE_KEY * len(owner), at)
         parts: tuple[Any, ...] = key
     else:
         parts = (key,)
