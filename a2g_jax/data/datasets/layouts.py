@@ -7,9 +7,6 @@ in ``data_utils.py`` of Yoon et al. 2020 and in ``data_utils_expressive.py`` of 
 the right one once nose and eyes are gone).
 """
 
-import numpy as np
-from jaxtyping import Float
-
 from a2g_jax.data.poses import PoseLayout
 from a2g_jax.data.talker.views.directions import TED, TED_EXPRESSIVE, BoneLayout
 from a2g_jax.data.talker.views.keypoints import KEYPOINTS
@@ -38,13 +35,3 @@ def _keypoint_bones() -> tuple[tuple[int, int], ...]:
 S2G_LAYOUT = PoseLayout(names=KEYPOINTS, bones=_keypoint_bones())
 """49 points: neck, right arm, left arm, left hand, right hand; wrists come twice, as the end of an arm and as the start
 of a hand."""
-
-#: Of 52 points: nose and both eyes, which Speech2Gesture drops (``delete_face_keypoints``).
-_FACE = (7, 8, 9)
-
-
-def without_face(points: Float[np.ndarray, "T P 2"]) -> Float[np.ndarray, "T 49 2"]:
-    """The 49 points of 49, or of 52 with nose and eyes as points 7, 8 and 9."""
-    if points.shape[1] == len(KEYPOINTS) + len(_FACE):
-        points = np.delete(points, _FACE, axis=1)
-    return points

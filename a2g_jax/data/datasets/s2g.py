@@ -30,8 +30,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.datasets.gaps import bridge_gaps, rate_of
-from a2g_jax.data.datasets.layouts import S2G_LAYOUT, without_face
+from a2g_jax.data.datasets.gaps import rate_of
+from a2g_jax.data.datasets.keypoints import relative_keypoints
+from a2g_jax.data.datasets.layouts import S2G_LAYOUT
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, table_rows, unique_names
 from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.source import DataSet, Take
@@ -145,8 +146,7 @@ def _stretches(windows: list[_Window]) -> Iterable[list[_Window]]:
 
 
 def _enough(windows: list[_Window]) -> list[_Window]:
-    """Some of the windows of a stretch: each begins within the first half of the one before, where there is such a one,
-    and the last is the last."""
+    """The first and the last window of a stretch, and as few between as half overlap each other, where it can be."""
     chosen = [windows[0]]
     for window, following in pairwise([*windows[1:], windows[-1]]):
         last = chosen[-1]
@@ -179,7 +179,8 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
         if offset > len(sound):
             raise InputError(f"{before}, audio: ends before the next window begins; extract this interval anew.")
         # Whoever cut the windows may have rounded to the other side.
-        offset = _shift(sound, speech, (offset, offset + 1, offset - 1)) or offset
+        found = _shift(sound, speech, (offset, offset + 1, offset - 1))
+        offset = offset if found is None else found
         poses.append(following[len(pose) - shift :])
         sounds.append(speech[len(sound) - offset :])
         frame, sample, pose, sound = frame + shift, sample + offset, following, speech
@@ -191,17 +192,11 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
         name=take.name,
         audio=speech_samples(np.concatenate(sounds), AUDIO_RATE, sample_rate, f"{place}, audio"),
         sample_rate=sample_rate,
-        motion=PoseTrack("keypoints", relative_points(points, fps, f"{place}, pose"), S2G_LAYOUT, fps),
+        motion=PoseTrack("keypoints", relative_keypoints(points, fps, f"{place}, pose"), S2G_LAYOUT, fps),
         speaker=take.spec["speaker"],
         sources=take.sources,
         annotations={"interval": take.spec["interval"], "video_start": times[0][0]},
     )
-
-
-def relative_points(points: Float[np.ndarray, "T P 2"], fps: float, place: str) -> Float[np.ndarray, "T 49 2"]:
-    """49 keypoints, float32, relative to point 0, with short gaps bridged."""
-    points = bridge_gaps(without_face(points), fps, place)
-    return (points - points[:, :1]).astype(np.float32)
 
 
 def _read_window(path: str) -> tuple[Float[np.ndarray, "T P 2"], np.ndarray]:
@@ -209,8 +204,10 @@ def _read_window(path: str) -> tuple[Float[np.ndarray, "T P 2"], np.ndarray]:
     pose, sound = arrays["pose"], arrays["audio"]
     if pose.ndim != 3 or pose.shape[1] != 2 or pose.shape[2] not in (49, 52) or pose.dtype.kind not in "fiu":
         raise InputError(f"{path}, pose: expected numbers of shape (T, 2, 49 or 52); got {pose.dtype} {pose.shape}.")
-    if len(pose) < 2 or sound.ndim != 1:
-        raise InputError(f"{path}: has {len(pose)} frames and audio of shape {sound.shape}; make the window anew.")
+    if len(pose) < 2 or sound.ndim != 1 or sound.dtype.kind not in "if":
+        raise InputError(
+            f"{path}: has {len(pose)} frames and audio {sound.dtype} of shape {sound.shape}; make the window anew."
+        )
     return np.swapaxes(pose, 1, 2).astype(np.float64), sound
 
 

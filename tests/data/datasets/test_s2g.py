@@ -152,6 +152,7 @@ def test_wrong_folders_and_tables(tmp_path):
     [
         (lambda pose, audio: {"pose": pose, "sound": audio}, "has no array 'audio'"),
         (lambda pose, audio: {"pose": pose[:, :, :40], "audio": audio}, r"pose: expected numbers of shape"),
+        (lambda pose, audio: {"pose": pose, "audio": np.array(["a"])}, "audio <U1 of shape"),
         (lambda pose, audio: {"pose": pose + 1, "audio": audio}, "is no continuation of"),
         (lambda pose, audio: {"pose": pose, "audio": audio.reshape(2, -1)}, "audio of shape"),
         (lambda pose, audio: {"pose": pose, "audio": audio * np.nan}, "audio: holds NaN"),
@@ -170,6 +171,14 @@ def test_damaged_windows(tmp_path, change, message):
         np.savez(path, **arrays)
     with pytest.raises(InputError, match=message):
         DATASET.read(take, 16000)
+
+
+def test_points_in_no_image(tmp_path):
+    poses, audio = made_up_interval(100)
+    poses[70, 0, 9] = 1e30
+    write_interval(tmp_path, "oliver", "7", poses, audio, 5.0)
+    with pytest.raises(InputError, match=r"pose, frame 70: a keypoint is 1e.30 from the neck; expected pixels"):
+        DATASET.read(DATASET.find(tmp_path)[0], 16000)
 
 
 def test_missing_window(tmp_path):

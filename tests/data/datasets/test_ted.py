@@ -147,6 +147,35 @@ def test_wrong_clips(tmp_path, changes, message):
     assert f"{tmp_path / 'lmdb_train' / 'data.mdb'}, key 0000000000, clip 1" in str(caught.value)
 
 
+ANYTHING = [
+    *(None, True, 2**62, -1.0, float("nan"), 1e308, "", "x\0y\n", b"\xff", [], {}, (), [[1, [2]], None], {"a": [1]}),
+    *(np.zeros(0), np.zeros((0, 10, 3)), np.full((30, 10, 3), 1e300), np.full((30, 30), np.inf), np.zeros((2, 2, 2))),
+    *(np.arange(30, dtype=np.int8), np.float32(2), [["a", 13.0, 12.5]], [["a", None, 13.0]], [None] * 30),
+]
+
+
+def read_or_refuse(path):
+    try:
+        return ted.DATASET.read(ted.DATASET.find(path.parent)[0], 16000)
+    except InputError as error:
+        return error
+
+
+@pytest.mark.parametrize("entry", sorted({*CLIP} - {"audio_feat"}))
+def test_whatever_a_clip_holds(tmp_path, entry):
+    """It is read to finite numbers, or refused with one line that names the database."""
+    videos = [{"vid": "v", "clips": [CLIP | {entry: value}]} for value in ANYTHING]
+    for number, video in enumerate(videos):
+        path = write_videos(tmp_path / str(number), [video])
+        found = read_or_refuse(path)
+        if isinstance(found, InputError):
+            assert str(found).startswith(str(path))
+            assert "\n" not in str(found)
+        else:
+            assert np.isfinite(found.motion.values).all()
+            assert all(0 <= word.start <= word.end for word in found.words)
+
+
 @pytest.mark.parametrize(
     ("video", "message"),
     [
