@@ -154,7 +154,7 @@ def test_wrong_folders_and_tables(tmp_path):
         (lambda pose, audio: {"pose": pose[:, :, :40], "audio": audio}, r"pose: expected numbers of shape"),
         (lambda pose, audio: {"pose": pose, "audio": np.array(["a"])}, "audio <U1 of shape"),
         (lambda pose, audio: {"pose": pose + 1, "audio": audio}, "is no continuation of"),
-        (lambda pose, audio: {"pose": pose, "audio": audio.reshape(2, -1)}, "audio of shape"),
+        (lambda pose, audio: {"pose": pose, "audio": audio.reshape(2, -1)}, r"audio float32 of shape \(2, "),
         (lambda pose, audio: {"pose": pose, "audio": audio * np.nan}, "audio: holds NaN"),
         (None, "is not an .npz archive"),
     ],
