@@ -1,0 +1,149 @@
+"""Arrays in HDF5 files, as PATS comes in; needs the optional package h5py.
+
+HDF5 files can name other files (external links, external storage, virtual data sets) and filters that the library
+loads as code. All of these are refused here before anything is read, as are sizes beyond the limits. What remains is
+the C library's own reading of the file's structure, which no Python check replaces: take files from where you would
+take a program from.
+"""
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import check_readable
+from a2g_jax.io.untrusted.budget import CONVERT, Budget, Limits, clip
+
+#: Numbers of the filters that are read: deflate, shuffle, Fletcher's checksum, and h5py's LZF.
+_FILTERS = frozenset({1, 2, 3, 32000})
+#: Bytes that the library's notes on one chunk count for.
+_CHUNK = 512
+_MOST_SHOWN = 8
+# What h5py makes of the errors of the C library.
+_DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError)
+
+
+def read_hdf5(
+    path: str | os.PathLike[str], names: Sequence[str], limits: Limits | None = None
+) -> dict[str, np.ndarray]:
+    """Arrays of numbers, truth values or text in an HDF5 file.
+
+    Args:
+        path: the file.
+        names: paths of data sets in it, such as ``pose/data``.
+        limits: how much all of them may take.
+
+    Returns:
+        The arrays by name; text as NumPy text.
+
+    Raises:
+        InputError: h5py is missing; no such file, no HDF5 file, damaged, without a data set that is asked for, or one
+            that lies elsewhere, is of other types, is packed by other filters or goes beyond the limits.
+    """
+    path = check_readable(path, "an HDF5 file")
+    try:
+        import h5py
+    except ImportError:
+        raise InputError(f'{path}: is read with h5py, which is missing; run pip install "a2g_jax[hdf5]".') from None
+    limits = limits or Limits()
+    whole = Budget(str(path), limits)
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except _DAMAGE:
+        raise InputError(f"{path}: is not an HDF5 file, or is damaged; copy or download it again.") from None
+    with file:
+        result = {}
+        for name in names:
+            try:
+                result[name] = _read(h5py, path, _find(h5py, path, file, name), name, whole)
+            except InputError:
+                raise
+            except _DAMAGE as error:
+                reason = " ".join(str(error).split())[:120] or type(error).__name__
+                raise InputError(f"{path}: {clip(name)} is damaged ({reason}); copy or download it again.") from None
+    return result
+
+
+def _find(h5py: Any, path: Path, file: Any, name: str) -> Any:
+    """The data set of a name, through groups of this file only."""
+    place = file
+    parts = [part for part in name.split("/") if part]
+    for number, part in enumerate(parts):
+        link = place.get(part, getlink=True) if isinstance(place, h5py.Group) else None
+        if link is None:
+            there = list(islice(place, _MOST_SHOWN + 1)) if isinstance(place, h5py.Group) else []
+            shown = ", ".join(clip(entry, 30) for entry in there[:_MOST_SHOWN]) or "nothing"
+            above = clip("/".join(parts[:number])) if number else "the file"
+            more = " and more" if len(there) > _MOST_SHOWN else ""
+            raise InputError(f"{path}: has no data set {clip(name)}; {above} has {shown}{more}.")
+        if not isinstance(link, h5py.HardLink):
+            target = clip(getattr(link, "filename", None) or getattr(link, "path", ""))
+            raise InputError(f"{path}: {clip(name)} is a link to {target}, which is refused; {CONVERT}.")
+        place = place[part]
+    if not isinstance(place, h5py.Dataset):
+        raise InputError(f"{path}: {clip(name)} is a group or a type; name a data set.")
+    return place
+
+
+def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.ndarray:
+    def refuse(what: str) -> InputError:
+        return InputError(f"{path}: {clip(name)} {what}; {CONVERT}.")
+
+    layout = found.id.get_create_plist()
+    if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
+        raise refuse("lies in other files, which is refused")
+    filters = [layout.get_filter(index) for index in range(layout.get_nfilters())]
+    codes = [code for code, *_ in filters]
+    for code, _, _, label in filters:
+        if code not in _FILTERS or codes.count(code) > 1:
+            raise refuse(f"is packed by filter {code} ({clip(label, 30)}), which is refused")
+    text = h5py.check_string_dtype(found.dtype)
+    dtype, shape = found.dtype, found.shape
+    if shape is None or not (text or (dtype.kind in "biuf" and dtype.itemsize <= 8)):
+        raise refuse(f"is of type {clip(str(dtype))}; expected an array of plain numbers or text")
+    size = math.prod(shape)
+    charge = _charger(path, name, budget)
+    charge(2 * size * dtype.itemsize)
+    if found.chunks is not None:
+        grid = [-(-length // step) for length, step in zip(shape, found.chunks, strict=True)]
+        charge(2 * math.prod(found.chunks) * dtype.itemsize + _CHUNK * math.prod(grid))
+    if size and not found.id.get_storage_size():
+        raise InputError(f"{path}: {clip(name)} was never written; copy or download the file again.")
+    if text is not None:
+        return _text(found, text.length is None, charge)
+    array = found[()]
+    array = np.array(array, dtype.newbyteorder("=").str, order="C")
+    if dtype.kind == "b" and size and array.view(np.uint8).max() > 1:
+        raise ValueError("a truth value is neither 0 nor 1")
+    return array
+
+
+def _text(found: Any, is_variable: bool, charge: Callable[[int], None]) -> np.ndarray:
+    """Text, element by element where each may be of any length, so that what it takes is known in time."""
+    if not is_variable:
+        charge(8 * found.size * found.dtype.itemsize)
+        return np.char.decode(found[()], "utf-8")
+    texts = []
+    for place in np.ndindex(found.shape):
+        raw = found[place]
+        charge(len(raw) + 64)
+        texts.append(raw.decode("utf-8"))
+    charge(4 * len(texts) * max(map(len, texts), default=0))
+    return np.array(texts, np.str_).reshape(found.shape)
+
+
+def _charger(path: Path, name: str, budget: Budget) -> Callable[[int], None]:
+    def charge(size: int) -> None:
+        budget.left -= size
+        if budget.left < 0:
+            raise InputError(
+                f"{path}: {clip(name)} would take more than {budget.limits.size} bytes of memory; if you trust the "
+                "file, raise the limit."
+            )
+
+    return charge
