@@ -1,7 +1,9 @@
 """Procedural humanoid rigs and a pose-for-pose truth: every rig shows the same person doing the same thing."""
 
 import math
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.bvh import read_bvh, write_bvh
 
 #: Where the joints of a T-pose are, from the part above, in metres: left side, x left, y up, z forward.
 TRUNK = {"Spine": (0.0, 0.3, -0.01), "Neck": (0.0, 0.2, -0.01), "Head": (0.0, 0.09, 0.02)}
@@ -86,6 +89,8 @@ class Spec:
     above_root: bool = False
     leaf_ends: bool = False
     proportions: int = 0
+    tips: bool = False
+    """Whether every leaf has an end site, as exporters write them into files."""
 
     def build(self, poses: "Poses") -> tuple[Motion, dict[str, int]]:
         """The motion on the rig, and the joints of its parts."""
@@ -109,6 +114,33 @@ def specs() -> st.SearchStrategy[Spec]:
         leaf_ends=st.booleans(),
         proportions=st.integers(0, 1000),
     ).filter(lambda spec: not (spec.dialect == "nameless" and spec.twists == "chain"))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a motion is written as BVH."""
+
+    order: str = "ZXY"
+    unit: float = 100.0
+    """Units of the file in a metre."""
+
+
+def layouts() -> st.SearchStrategy[Layout]:
+    """Any order of the rotations; centimetres and metres."""
+    return st.builds(Layout, st.permutations("XYZ").map("".join), st.sampled_from([100.0, 1.0]))
+
+
+def through_file(motion: Motion, layout: Layout) -> Motion:
+    """The motion as it comes back from a BVH file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "motion.bvh"
+        write_bvh(path, motion, order=layout.order, scale=layout.unit)
+        return read_bvh(path)
+
+
+def file_name(motion: Motion, joint: int) -> str:
+    """Name of a joint in a file."""
+    return motion.skeleton.names[joint].replace(" ", "_")
 
 
 @dataclass(frozen=True)
@@ -160,9 +192,13 @@ class _Builder:
         self.weight: list[float] = []
         self.joints: dict[str, int] = {}
         self.rolled: dict[int, np.ndarray] = {}
+        #: Joints that only mark an end.
+        self.marks: set[int] = set()
 
     def add(self, name: str, parent: int, part: str, bone, turn: np.ndarray, weight: float = 1.0) -> int:
         """A joint that moves as ``part``; ``bone`` from the joint above in a T-pose; ``turn`` from T-pose to rest."""
+        if name.lower().endswith("end"):
+            self.marks.add(len(self.names))
         if self.spec.dialect == "nameless":
             name = f"joint{len(self.names)}"
         self.names.append(name)
@@ -245,6 +281,17 @@ class _Builder:
                 along = (0.03, -0.012, 0.03) if finger == "Thumb" else (0.035 + 0.005 * (finger == "Middle"), 0.0, 0.0)
                 bone = np.array(along) * (sign, 1, 1)
 
+    def tips(self) -> list[tuple[int, np.ndarray]]:
+        """Leaves, and where their bones end in a T-pose."""
+        found = []
+        for joint in sorted(set(range(len(self.names))) - set(self.parents)):
+            along = {"Head": (0, 0.18, 0), "L_Foot": (0, -0.02, 0.06), "R_Foot": (0, -0.02, 0.06)}.get(
+                self.parts[joint]
+            )
+            tip = self.bones[joint] * 0.5 if along is None else np.array(along)
+            found.append((joint, tip * self.spec.scale * (joint not in self.marks)))
+        return found
+
     def local_axes(self) -> np.ndarray:
         """``R_rest_joint`` of every joint."""
         if self.spec.frames == "world":
@@ -287,6 +334,8 @@ class _Builder:
                 local[:, joint] = np.swapaxes(world[:, parent], -1, -2) @ world[:, joint]
         crown = align[self.joints["Head"]] @ np.array([0, 0.18, 0]) * self.spec.scale
         ends = () if self.spec.leaf_ends else ((self.joints["Head"], tuple(crown.tolist())),)
+        if self.spec.tips:
+            ends = tuple((joint, tuple((align[joint] @ tip).tolist())) for joint, tip in self.tips())
         lengths = (offsets * self.spec.scale).astype(np.float32)
         skeleton = Skeleton(lengths, tuple(self.names), tuple(self.parents), ends)
         root = np.concatenate([poses.hips[:1], poses.hips]) @ stand.T * self.spec.scale * self.size[2]

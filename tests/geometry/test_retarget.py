@@ -6,7 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rigs_for_tests import DIALECTS, PARTS, Poses, Spec, angle, carrier, places, specs, world
+from rigs_for_tests import (
+    DIALECTS,
+    PARTS,
+    Poses,
+    Spec,
+    angle,
+    carrier,
+    file_name,
+    layouts,
+    places,
+    specs,
+    through_file,
+    world,
+)
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.talker.body import TALKER_SKELETON
@@ -19,10 +32,58 @@ from a2g_jax.io.bvh import read_bvh
 POSES = Poses.random(4, 3)
 
 
-@settings(max_examples=100, deadline=None)  # two rigs each
+@settings(max_examples=25, deadline=None)  # two rigs each
 @given(specs(), specs(), st.integers(0, 5))
 def test_there_and_back(first, second, seed):
     """Joints are found, the other rig shows the true pose, and the way back returns every matched joint."""
+    go_there_and_back(first, second, seed)
+
+
+@pytest.mark.slow
+@settings(max_examples=200, deadline=None)
+@given(specs(), specs(), st.integers(0, 1000))
+def test_there_and_back_on_400_rigs(first, second, seed):
+    go_there_and_back(first, second, seed)
+
+
+@settings(max_examples=15, deadline=None)
+@given(specs(), specs(), layouts(), layouts(), st.integers(0, 5))
+def test_there_and_back_through_files(first, second, layout, other, seed):
+    """The same, each motion written as BVH of any rotation order and unit and read again on its way."""
+    go_through_files(first, second, layout, other, seed)
+
+
+@pytest.mark.slow
+@settings(max_examples=200, deadline=None)
+@given(specs(), specs(), layouts(), layouts(), st.integers(0, 1000))
+def test_there_and_back_through_files_of_400_rigs(first, second, layout, other, seed):
+    go_through_files(first, second, layout, other, seed)
+
+
+def go_through_files(first, second, layout, other, seed):
+    poses = Poses.random(3, seed)
+    first, second = (dataclasses.replace(spec, tips=True) for spec in (first, second))
+    built, joints = first.build(poses)
+    shown, theirs = second.build(poses)
+    motion, truth = through_file(built, layout), through_file(shown, other)
+    source, target = find_rig(motion), find_rig(truth)
+    there = through_file(retarget(motion, target, source=source), other)
+    back = through_file(retarget(there, source, source=target), layout)
+    # A file lists joints depth-first and knows no spaces in names.
+    order = [motion.skeleton.index(file_name(built, joint)) for joint in range(built.skeleton.joints)]
+    matched = [carrier(first, joints, part) for part in PARTS]
+    worst = angle(world(motion)[:, [order[j] for j in matched]], world(back)[:, [order[j] for j in matched]])
+    assert worst < 0.1
+    np.testing.assert_allclose(world(motion)[:, order], world(built), atol=1e-5)
+    target_order = [truth.skeleton.index(file_name(shown, joint)) for joint in range(shown.skeleton.joints)]
+    for part in PARTS:
+        joint = carrier(second, theirs, part)
+        assert angle(world(there)[1:, target_order[joint]], world(shown)[1:, joint]) < 0.1, part
+    tall = max(source.height, target.height)
+    np.testing.assert_allclose(back.root, motion.root, atol=2e-3 * tall)
+
+
+def go_there_and_back(first, second, seed):
     poses = Poses.random(3, seed)
     motion, joints = first.build(poses)
     truth, theirs = second.build(poses)
@@ -217,3 +278,18 @@ def test_real_rigs_there_and_back(shared, name):
         assert angle(world(motion)[:, matched], world(back)[:, matched]) < 0.05
         wrists = [rig.roles["L_Wrist"], rig.roles["R_Wrist"]]
         assert angle(world(motion)[:, wrists], world(there)[:, [target.roles["L_Wrist"], target.roles["R_Wrist"]]]) < 8
+
+
+def test_an_invented_end_of_a_hand_points_anywhere():
+    """A hand without fingers takes its line from its end site, unless that cannot be of a hand."""
+    motion, joints = Spec(frames="permuted").build(POSES)
+    truth, theirs = Spec(dialect="unreal").build(POSES)
+    rig = find_rig(motion)
+    wrist = joints["L_Wrist"]
+    for turn, follows in ((20.0, True), (90.0, False)):
+        bent = Rotation.from_euler("y", turn, degrees=True).as_matrix() @ np.array([0.1, 0.0, 0.0])
+        x, y, z = (rig.align[wrist] @ bent).tolist()
+        skeleton = dataclasses.replace(motion.skeleton, ends=(*motion.skeleton.ends, (wrist, (x, y, z))))
+        there = retarget(dataclasses.replace(motion, skeleton=skeleton), truth.skeleton)
+        off = angle(world(there)[1:, theirs["L_Wrist"]], world(truth)[1:, theirs["L_Wrist"]])
+        assert off == pytest.approx(turn if follows else 0.0, abs=0.1)

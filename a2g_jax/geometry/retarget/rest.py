@@ -29,6 +29,8 @@ _SHOWS_HINGE = 15.0
 #: A foot bone that lies flatter than the first angle was drawn without regard to the sole; the usual slope, in
 #: degrees, from ankle to ball of a flat foot is the second (25 in the generated body, 27 in standing ZeroEGGS takes).
 _FLAT_FOOT, _USUAL_SLOPE = 5.0, 25.0
+#: A hand without fingers whose end lies farther from the line of the forearm, in degrees, was not drawn with it.
+_BENT_HAND = 60.0
 #: Where the bones of a T-pose point, in the body frame, left side.
 _LEFT, _DOWN, _FORWARD = np.eye(3)[0], -np.eye(3)[1], np.eye(3)[2]
 _THUMB = unit(np.array([0.65, -0.3, 0.7]))
@@ -203,7 +205,11 @@ def _hand(side: str, out: Float[np.ndarray, "3"], above: Float[np.ndarray, "3 3"
     }
     if not bases:
         ends = pose.tip(wrist)
-        return above if ends is None else shortest_turn(above @ pose.body @ out, ends) @ above
+        forearm = above @ pose.body @ out
+        # Writers invent ends where there were none, and these point anywhere.
+        if ends is None or angle_between(forearm, ends) > _BENT_HAND:
+            return above
+        return shortest_turn(forearm, ends) @ above
     points = bases.get("Middle", sum(bases.values(), np.zeros(3)) / len(bases))
     last = next((bases[finger] for finger in ("Pinky", "Ring") if finger in bases), None)
     if "Index" in bases and last is not None and angle_between(points, bases["Index"] - last) > 20:
