@@ -40,9 +40,9 @@ def test_there_and_back(first, second, seed):
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(specs(), specs(), st.integers(0, 1000))
-def test_there_and_back_on_400_rigs(first, second, seed):
+def test_there_and_back_on_hundreds_of_rigs(first, second, seed):
     go_there_and_back(first, second, seed)
 
 
@@ -54,9 +54,9 @@ def test_there_and_back_through_files(first, second, layout, other, seed):
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=400, deadline=None)
 @given(specs(), specs(), layouts(), layouts(), st.integers(0, 1000))
-def test_there_and_back_through_files_of_400_rigs(first, second, layout, other, seed):
+def test_there_and_back_through_files_of_hundreds_of_rigs(first, second, layout, other, seed):
     go_through_files(first, second, layout, other, seed)
 
 
