@@ -41,8 +41,9 @@ def inspect_corpus(path: Path) -> Report:
     with progress_bar(len(corpus.recordings), "inspecting", "recording") as bar:
         for entry, audio, pose, root in _rows(corpus):
             faults = check_finite(audio, "audio features") + check_finite(pose, "poses") + check_finite(root, "root")
-            heard.append(bands_print(audio[:, : corpus.mel.bands], corpus.fps))
-            seen.append(poses_print(pose.reshape(len(pose), -1), corpus.fps))
+            sound = 0 if faults else len(pose)
+            heard.append(bands_print(audio[:sound, : corpus.mel.bands], corpus.fps))
+            seen.append(poses_print(pose.reshape(len(pose), -1)[:sound], corpus.fps))
             if not faults and isinstance(corpus.body, Skeleton) and corpus.representation in ("6d", "exponential"):
                 motion = corpus.motion(entry.first, entry.first + entry.frames)
                 if rig is None:

@@ -106,9 +106,13 @@ def check_offset(offset: Offset | None) -> list[Finding]:
 
 def energy_db(audio: Float[np.ndarray, " N"], sample_rate: int, seconds: float) -> Float[np.ndarray, " K"]:
     """Energy of speech at :data:`RATE`, in dB, smoothed over 20 ms, from zero to ``seconds``."""
-    power = ndimage.gaussian_filter1d(np.square(audio, dtype=np.float64), 0.02 * sample_rate, mode="constant")
-    samples = np.rint(np.arange(int(seconds * RATE)) * sample_rate / RATE).astype(int)
-    return 10 * np.log10(power[np.minimum(samples, len(audio) - 1)] + 1e-12)
+    block = max(1, sample_rate // 400)
+    count = max(1, len(audio) // block)
+    power = np.square(audio[: count * block].reshape(count, -1), dtype=np.float64).mean(axis=1)
+    smooth = ndimage.gaussian_filter1d(power, 0.02 * sample_rate / block, mode="constant")
+    # Of the blocks, whose middles lie half a block after their starts.
+    where = np.arange(int(seconds * RATE)) * sample_rate / RATE / block - 0.5
+    return 10 * np.log10(smooth[np.clip(np.rint(where).astype(int), 0, count - 1)] + 1e-12)
 
 
 def wrist_places(motion: Motion, rig: Rig) -> Float[np.ndarray, "T 2 3"]:

@@ -27,6 +27,12 @@ def clean(number: int, seconds: float = 20.0) -> Recording:
     return talk(seconds, 40 + number, speaker=speaker, emotion=emotion, room=room, name=f"clean{number}")
 
 
+@cache
+def long_talk() -> Recording:
+    """A clean recording that is long enough to measure an offset in."""
+    return talk(64.0, 1000, speaker="ada", name="long")
+
+
 def write_pair(folder: Path, recording: Recording, name: str = "take") -> tuple[Path, Path]:
     """The recording as BVH and WAV."""
     bvh, wav = folder / f"{name}.bvh", folder / f"{name}.wav"
