@@ -142,11 +142,13 @@ def inspect_npz(path: Path) -> Inspected:
 def _smplx(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
     poses = float_array(arrays["poses"], ((55, 3), (165,)), f"{path}, poses")
     trans = float_array(arrays["trans"], ((3,),), f"{path}, trans")
+    if len(trans) != len(poses):
+        raise InputError(f"{path}, trans: has {len(trans)} frames; 'poses' has {len(poses)}.")
     rate = arrays["mocap_frame_rate"]
     if rate.size != 1 or rate.dtype.kind not in "iuf" or not 1 <= float(rate.reshape(-1)[0]) <= 1000:
         raise InputError(f"{path}, mocap_frame_rate: expected frames a second, such as 30.")
     turns = np.concatenate([poses[:, BODY], poses[:, HANDS]], axis=1)
-    return smplx_motion(turns, trans[: len(turns)], float(rate.reshape(-1)[0]), str(path))
+    return smplx_motion(turns, trans, float(rate.reshape(-1)[0]), str(path))
 
 
 def inspect_together(first: Inspected, audio: Inspected) -> Inspected:

@@ -1,5 +1,6 @@
 """What an inspection says, as one JSON document and as text."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,7 +38,7 @@ class Report:
 
     def to_json(self) -> dict[str, Any]:
         """The document."""
-        return {
+        document = {
             "format": FORMAT,
             "version": VERSION,
             "path": self.path,
@@ -45,6 +46,7 @@ class Report:
             "facts": self.facts,
             "findings": [finding.to_json() for finding in self.findings],
         }
+        return _without_nan(document)
 
     def text(self) -> str:
         """For a terminal."""
@@ -77,6 +79,15 @@ class Report:
                 if len(same) > _SHOWN:
                     lines.append(f"  [{code}] and {len(same) - _SHOWN} more; --json lists them all")
         return lines if self.warnings else [*lines, "", "no warnings"]
+
+
+def _without_nan(value: Any) -> Any:
+    """JSON knows no NaN and no infinity: null."""
+    if isinstance(value, dict):
+        return {name: _without_nan(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _section(section: dict[str, Any]) -> list[str]:

@@ -8,7 +8,7 @@ from recordings_for_tests import CAST, RATE, clean, codes, frozen, long_talk, tu
 
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import find_rig
-from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.audio_checks import check_audio, clipped_share
 from a2g_jax.inspection.command import inspect
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.sync import RATE as RATE_OF_OFFSETS
@@ -153,6 +153,14 @@ def test_clipping():
     assert codes(check_audio(loud, RATE)) == {"clipping"}
     # Clipped before it was made quieter, and rounded to 16 bits.
     assert codes(check_audio((np.rint(0.3 * loud * 32767) / 32768).astype(np.float32), RATE)) == {"clipping"}
+
+
+def test_loud_is_not_clipped():
+    """The tops of a tone are single samples, and those of clean speech are few."""
+    tone = np.sin(2 * np.pi * 440.0 * np.arange(RATE) / RATE).astype(np.float32)
+    assert clipped_share(tone) == (0.0, 0)
+    speech = clean(2).audio
+    assert clipped_share(speech / np.abs(speech).max())[0] < 1e-4
 
 
 def test_silence():
