@@ -129,15 +129,16 @@ def find_copies(prints: Sequence[Print]) -> list[Copy]:
         same = np.flatnonzero((words[step:] == words[:-step]) & (owner[step:] != owner[:-step]))
         found.append(np.stack([owner[same], owner[same + step], frame[same], frame[same + step]], axis=1))
     # Owners are sorted among equal words, so the first is always the smaller.
-    hits = np.concatenate(found)
+    hits = np.concatenate(found).astype(np.int32)
     copies: dict[tuple[int, int], tuple[int, Copy]] = {}
     lag = hits[:, 3] - hits[:, 2]
     # A copy cut between two frames agrees at either of the shifts beside it.
     for keys in (lag, lag + 1):
         group = np.stack([hits[:, 0], hits[:, 1], keys // 2], axis=1)
         kinds, where, counts = np.unique(group, axis=0, return_inverse=True, return_counts=True)
+        rows, stops = np.argsort(where.ravel(), kind="stable"), np.cumsum(counts)
         for kind in np.flatnonzero(counts >= _AGREEING):
-            members = hits[where.ravel() == kind]
+            members = hits[rows[stops[kind] - counts[kind] : stops[kind]]]
             span = int(members[:, 2].max() - members[:, 2].min()) + 1
             pair = int(kinds[kind, 0]), int(kinds[kind, 1])
             if len(np.unique(members[:, 2])) < max(_AGREEING, _DENSE * span):

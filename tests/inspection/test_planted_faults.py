@@ -79,6 +79,9 @@ def test_offset_is_not_told_where_it_cannot_be():
     known = measure_offset(energy_db(long_talk().audio, RATE, 64.0), wrists)
     assert known.known
     assert check_offset(known) == []
+    near = measure_offset(energy_db(long_talk().audio[RATE // 8 :], RATE, 60.0), wrists)
+    assert near.seconds - known.seconds == pytest.approx(0.125, abs=0.03)
+    assert check_offset(near) == []
     other = measure_offset(energy_db(long_talk().audio[::-1].copy(), RATE, 64.0), wrists)
     assert not other.known
     assert check_offset(other) == []
