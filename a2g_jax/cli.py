@@ -7,11 +7,16 @@ from typing import Any, NoReturn
 
 from a2g_jax import __version__
 from a2g_jax.errors import A2GError, Interrupted
+from a2g_jax.generation import retarget_arguments as retargeting
+from a2g_jax.inspection import arguments as inspection
 
 #: Names of the models; the registry itself is imported late, because it costs seconds.
-MODEL_NAMES = ("audio2gestures",)
+MODEL_NAMES = ("audio2gestures", "motion_autoencoder", "emotion_classifier")
 #: What can be prepared; the readers themselves are imported late for the same reason.
-READERS = ("talker", "folder")
+READERS = (
+    *("talker", "folder", "trinity", "genea2022", "genea2023", "beat", "beat2", "zeroeggs"),
+    *("ted", "ted-expressive", "s2g", "pats", "show"),
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -165,6 +170,12 @@ def make_parser() -> argparse.ArgumentParser:
     train.add_argument("--resume", action="store_true", help="go on from the latest checkpoint")
     train.add_argument("--settings", action="store_true", help="list every setting with its value, and do nothing")
 
+    inspect = command("inspect", inspection.DESCRIPTION)
+    inspection.add_arguments(inspect)
+
+    retarget = command("retarget", retargeting.DESCRIPTION)
+    retargeting.add_arguments(retarget)
+
     generate = command("generate", "Make motions for a speech with a trained run.")
     generate.add_argument("run", help="a run folder, or 'demo' for the weights that come along")
     generate.add_argument("--audio", required=True, metavar="FILE", help="speech, in any common format")
@@ -182,7 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         from a2g_jax import commands  # late: importing JAX takes seconds, and --help should not
 
-        getattr(commands, f"run_{options.command}")(options, extra)
+        return getattr(commands, f"run_{options.command}")(options, extra) or 0
     except KeyboardInterrupt:
         print("a2g: interrupted", file=sys.stderr)
         return 130

@@ -20,9 +20,11 @@ from a2g_jax.data.talker.recordings import talk
 from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.generation import retarget_command
 from a2g_jax.generation.deliver import check_formats, deliver
 from a2g_jax.generation.deliver_talk import check_talk_formats, deliver_talk
 from a2g_jax.generation.talk_request import TalkRequest, corpus_request
+from a2g_jax.inspection import command as inspect_command
 from a2g_jax.io.audio import read_audio
 from a2g_jax.models import find_model
 from a2g_jax.progress import progress_bar
@@ -215,6 +217,16 @@ def run_training(
     _cache_compilations()
     opened = Corpus.open(corpus)
     return train(RunConfig.of(name, preset, model, training, opened), opened, out, resume=resume)
+
+
+def run_inspect(options: argparse.Namespace, extra: list[str]) -> int:
+    """``a2g inspect``; the exit status."""
+    return inspect_command.run(options, extra)
+
+
+def run_retarget(options: argparse.Namespace, extra: list[str]) -> None:
+    """``a2g retarget``."""
+    retarget_command.run(options, extra)
 
 
 def run_talk(options: argparse.Namespace, _extra: list[str]) -> None:

@@ -83,13 +83,17 @@ class Dressing:
     """Strength of :func:`~a2g_jax.features.augment.augment_log_mel`; 0 for none."""
 
     def __call__(
-        self, key: Key[Array, ""] | None, audio: Float[Array, "B T bands"], pose: Float[Array, "B T J 6"]
+        self,
+        key: Key[Array, ""] | None,
+        audio: Float[Array, "B T width"],
+        pose: Float[Array, "B T R D"],
+        labels: Int[Array, "B 2"],
     ) -> Batch:
         """Normalised, and augmented when a key is given."""
         if key is not None and self.augmentation > 0:
             keys = jax.random.split(key, audio.shape[0])
             audio = jax.vmap(lambda k, clip: augment_log_mel(k, clip, self.augmentation))(keys, audio)
-        return Batch(self.audio_statistics.normalise(audio), pose)
+        return Batch(self.audio_statistics.normalise(audio), pose, labels[:, 0], labels[:, 1])
 
 
 def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " clips"]:

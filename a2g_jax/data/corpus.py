@@ -1,6 +1,7 @@
 """A prepared corpus on disk: features and motion at the same frame times, as memory-mapped arrays."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Float, Int16
+from jaxtyping import Float, Int16, Int32
 
 from a2g_jax.data.poses import PoseLayout
 from a2g_jax.data.representation import WIDTHS, rotations_from_rows
@@ -187,6 +188,23 @@ class Corpus:
             return self.body.joints
         return len(self.body.names if self.representation == "keypoints" else self.body.bones)
 
+    @cached_property
+    def emotions(self) -> tuple[str, ...]:
+        """Every emotion of the corpus, those to be generated included, in alphabetical order."""
+        later = self.recipe.get("emotions", ()) if self.on_demand else ()
+        return tuple(sorted({*later, *(entry.emotion for entry in self.recordings)}))
+
+    @cached_property
+    def speakers(self) -> tuple[str, ...]:
+        """Every speaker of the corpus, likewise."""
+        later = self.recipe.get("speakers", ()) if self.on_demand else ()
+        return tuple(sorted({*later, *(entry.speaker for entry in self.recordings)}))
+
+    @cached_property
+    def labels(self) -> Int32[np.ndarray, "N 2"]:
+        """For each row, which of :attr:`emotions` and which of :attr:`speakers` it is of."""
+        return label_rows(self, [(entry.emotion, entry.speaker, entry.frames) for entry in self.recordings])
+
     @property
     def parts(self) -> int:
         """Parts that training takes in turns: the stored recordings, and those that are generated."""
@@ -263,6 +281,13 @@ class Corpus:
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and whatever else is known about a recording; times in seconds."""
         return read_json(self.path / "annotations" / f"{recording:05d}.json")
+
+
+def label_rows(corpus: Corpus, recordings: Sequence[tuple[str, str, int]]) -> Int32[np.ndarray, "N 2"]:
+    """Indices of emotion and speaker for the rows of recordings given as (emotion, speaker, frames)."""
+    each = [(corpus.emotions.index(emotion), corpus.speakers.index(speaker)) for emotion, speaker, _ in recordings]
+    table = np.array(each, np.int32).reshape(-1, 2)
+    return np.repeat(table, [frames for *_, frames in recordings], axis=0)
 
 
 def skeleton_to_json(skeleton: Skeleton) -> dict[str, Any]:

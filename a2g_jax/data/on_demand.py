@@ -16,9 +16,9 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int32
 
-from a2g_jax.data.corpus import PARTS, Corpus
+from a2g_jax.data.corpus import PARTS, Corpus, label_rows
 from a2g_jax.data.generated import Role, TalkerOptions, generate_rows
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
@@ -43,6 +43,8 @@ class Part(NamedTuple):
 
     audio: Float[np.ndarray, "N width"]
     pose: Float[np.ndarray, "N R D"]
+    labels: Int32[np.ndarray, "N 2"]
+    """Indices of emotion and speaker, as :attr:`Corpus.labels`."""
     segments: list[Segment]
     """Stretches within which clips may lie, as rows of the arrays."""
 
@@ -135,7 +137,7 @@ class PartStream:
 
     def _wait(self, number: int, stop: threading.Event | None) -> Part | None:
         if number == 0:
-            return Part(self.corpus.audio, self.corpus.pose, self.corpus.segments("train"))
+            return Part(self.corpus.audio, self.corpus.pose, self.corpus.labels, self.corpus.segments("train"))
         futures = self._begin(number)
         while wait(futures, timeout=0.2, return_when="FIRST_EXCEPTION").not_done:
             if any(future.done() and future.exception() for future in futures):
@@ -143,14 +145,20 @@ class PartStream:
             if stop is not None and stop.is_set():
                 return None
         del self._coming[number]
-        return join_rows([future.result() for future in futures])
+        roles = self.corpus.later["parts"][number - 1]
+        return join_rows(self.corpus, roles, [future.result() for future in futures])
 
 
-def join_rows(arrays: list[tuple[np.ndarray, np.ndarray]]) -> Part:
+def join_rows(corpus: Corpus, roles: list[Role], arrays: list[tuple[np.ndarray, np.ndarray]]) -> Part:
     """A part of recordings given as their audio and pose rows."""
+    labels = label_rows(
+        corpus,
+        [(role["emotion"], role["speaker"], len(audio)) for role, (audio, _) in zip(roles, arrays, strict=True)],
+    )
     stops = list(accumulate(len(audio) for audio, _ in arrays))
     segments = [Segment(n, stop - len(arrays[n][0]), stop) for n, stop in enumerate(stops)]
-    return Part(np.concatenate([audio for audio, _ in arrays]), np.concatenate([pose for _, pose in arrays]), segments)
+    audio, pose = (np.concatenate([each[kind] for each in arrays]) for kind in (0, 1))
+    return Part(audio, pose, labels, segments)
 
 
 def check_generator(corpus: Corpus) -> None:

@@ -28,8 +28,15 @@ class Generator:
     """
 
     def __init__(self, run: Run) -> None:
+        """
+        Raises:
+            InputError: the run's model does not generate motion from audio.
+        """
         self.run = run
         model = run.config.build()
+        if model.condition is None or model.sample is None:
+            raise InputError(f"{run.config.model}: makes no motion from audio; name a run of a model that does.")
+        draw = model.sample
         self._halo = -(-model.halo // BLOCK) * BLOCK
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
@@ -38,7 +45,7 @@ class Generator:
 
         @jax.jit
         def sample(params, summary, key, condition, start):
-            pose = model.sample(params, summary, key, condition, start)
+            pose = draw(params, summary, key, condition, start)
             return matrix_from_6d(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW))
 
         self._sample = sample

@@ -131,6 +131,8 @@ def _table(path: Path) -> Iterator[Word]:
             raise InputError(
                 f"{path}, line {number}: expected start, end and word, separated by tabs; got {len(parts)} parts."
             )
+        if not parts[2].strip():
+            continue  # the challenge's own loaders skip times without a word too
         yield _word(f"{path}, line {number}", parts[2], parts[0].strip(), parts[1].strip())
 
 

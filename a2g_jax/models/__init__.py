@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from a2g_jax.data.representation import WIDTHS
 from a2g_jax.errors import InputError
-from a2g_jax.models import audio2gestures
+from a2g_jax.models import audio2gestures, emotion_classifier, motion_autoencoder
 from a2g_jax.models.base import Data, Model
 
 
@@ -20,6 +21,12 @@ class Entry(NamedTuple):
 
 MODELS: dict[str, Entry] = {
     "audio2gestures": Entry(audio2gestures.Audio2GesturesConfig, audio2gestures.PRESETS, audio2gestures.build),
+    "motion_autoencoder": Entry(
+        motion_autoencoder.MotionAutoencoderConfig, motion_autoencoder.PRESETS, motion_autoencoder.build, tuple(WIDTHS)
+    ),
+    "emotion_classifier": Entry(
+        emotion_classifier.EmotionClassifierConfig, emotion_classifier.PRESETS, emotion_classifier.build, tuple(WIDTHS)
+    ),
 }
 
 

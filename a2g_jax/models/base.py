@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
+from a2g_jax.data.poses import PoseLayout
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 
@@ -19,22 +20,43 @@ class Batch(NamedTuple):
 
     audio: Float[Array, "B T bands"]
     """Normalised audio features."""
-    pose: Float[Array, "B T J 6"]
-    """Local rotations in 6D (first two columns of each matrix), not normalised."""
+    pose: Float[Array, "B T R D"]
+    """Poses as the corpus writes them down, not normalised; in 6D the first two columns of each local rotation."""
+    emotion: Int[Array, " B"] | None = None
+    """Index into :attr:`Data.emotions`."""
+    speaker: Int[Array, " B"] | None = None
+    """Index into :attr:`Data.speakers`."""
 
 
 class Data(NamedTuple):
     """What a model is built for: everything about a corpus that is not a recording."""
 
-    skeleton: Skeleton
+    body: Skeleton | PoseLayout
+    """What the rows of a pose are."""
     fps: float
     audio_bands: int
     pose_statistics: Statistics
-    """Of the 6D rotations, over the training split; each (J, 6)."""
+    """Over the training split; each (R, D)."""
+    representation: str = "6d"
+    """How a pose is written down: see :mod:`a2g_jax.data.representation`."""
+    emotions: tuple[str, ...] = ()
+    """Of the corpus, in the order of their indices."""
+    speakers: tuple[str, ...] = ()
+    """Of the corpus, in the order of their indices."""
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton, where poses are its rotations."""
+        if not isinstance(self.body, Skeleton):
+            raise ValueError(f"poses are {self.representation}, which have no skeleton")
+        return self.body
 
 
 class Model(NamedTuple):
-    """A model as a record of pure functions; parameters and keys go in, arrays come out."""
+    """A model as a record of pure functions; parameters and keys go in, arrays come out.
+
+    Networks that measure instead of generating have no ``condition`` and ``sample``; classifiers no ``reconstruct``.
+    """
 
     name: str
     config: Any
@@ -48,13 +70,15 @@ class Model(NamedTuple):
     """``loss(params, key, batch, step) -> (scalar, named terms)``"""
     summarise: Callable[..., Summary]
     """``summarise(params, key, batch) -> arrays with a leading clip axis``, collected over the training split."""
-    condition: Callable[..., Any]
+    condition: Callable[..., Any] | None
     """``condition(params, audio (T, bands)) -> pytree``: what the samples for one audio share."""
-    sample: Callable[..., Array]
+    sample: Callable[..., Array] | None
     """``sample(params, summary, key, condition, start) -> pose (T, J, 6)``.
 
     ``start`` is the frame at which the window begins in the whole audio, a multiple of 128: randomness is a function
     of the key and the absolute frame, so any cutting into windows gives the same motion.
     """
-    reconstruct: Callable[..., Array]
-    """``reconstruct(params, batch) -> pose (B, T, J, 6)``: through the latent space and back, without noise."""
+    reconstruct: Callable[..., Array] | None
+    """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""
+    validation_loss: Callable[..., tuple[Array, dict[str, Array]]] | None = None
+    """``loss`` as it is taken on held-out clips, where that differs (no dropout)."""

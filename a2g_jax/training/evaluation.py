@@ -9,7 +9,8 @@ import numpy as np
 from a2g_jax.data.batches import Dressing, gather_from_disk, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
+from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.base import Batch, Model, Params, Summary
 from a2g_jax.training.run import RunConfig
 
@@ -31,24 +32,28 @@ def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: 
     for first in range(0, len(starts), _BATCH):
         rows = starts[first : first + _BATCH]
         audio, pose = gather_from_disk(corpus.audio, rows, frames), gather_from_disk(corpus.pose, rows, frames)
-        yield dressing(None, jnp.asarray(audio), jnp.asarray(pose))
+        yield dressing(None, jnp.asarray(audio), jnp.asarray(pose), jnp.asarray(corpus.labels[rows]))
 
 
 def validate(
     model: Model, params: Params, corpus: Corpus, config: RunConfig, split: str = "validation"
 ) -> dict[str, float]:
-    """Loss terms on a held-out split with a fixed key, and the reconstruction beside the mean pose, in cm.
+    """Loss terms on a held-out split with a fixed key, and the reconstruction beside the mean pose.
+
+    These are mean distances of joints in cm (``reconstruction_cm``, ``mean_pose_cm``), or for poses without a skeleton
+    mean distances of rows in their own unit (``reconstruction_error``, ``mean_pose_error``).
 
     Empty when every stretch of the split is shorter than a clip.
     """
     totals: dict[str, float] = {}
     count = 0
-    loss, rebuild = jax.jit(model.loss), jax.jit(_rebuild, static_argnums=(0, 3))
-    offsets, mean_pose = jnp.asarray(config.skeleton.offsets), config.statistics["pose"].mean
+    loss, rebuild = jax.jit(model.validation_loss or model.loss), jax.jit(_rebuild, static_argnums=(0, 3, 4))
+    body, mean_pose = config.body, config.statistics["pose"].mean
+    parents, offsets = (body.parents, jnp.asarray(body.offsets)) if isinstance(body, Skeleton) else ((), None)
     for number, batch in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
         value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
         figures = {"loss": value, **terms}
-        figures |= rebuild(_Static(model), params, batch, config.skeleton.parents, offsets, mean_pose)
+        figures |= rebuild(_Static(model), params, batch, config.representation, parents, offsets, mean_pose)
         clips = len(batch.audio)
         for name, figure in figures.items():
             totals[name] = totals.get(name, 0.0) + float(figure) * clips
@@ -69,14 +74,20 @@ class _Static:
         return isinstance(other, _Static) and self.reconstruct is other.reconstruct
 
 
-def _rebuild(model: _Static, params: Params, batch: Batch, parents, offsets, mean_pose):
+def _rebuild(model: _Static, params: Params, batch: Batch, representation: str, parents, offsets, mean_pose):
     """Mean distance of joints from where they were, for the reconstruction and for the mean pose."""
+    if model.reconstruct is None:
+        return {}
     clips, frames = batch.pose.shape[:2]
     still = jnp.broadcast_to(jnp.asarray(mean_pose)[None, None], (clips, frames, *mean_pose.shape))
     poses = jnp.stack([batch.pose, model.reconstruct(params, batch), still])
-    target, rebuilt, mean = joint_positions(matrix_from_6d(poses), offsets, parents)
-    error = lambda p: 100 * jnp.mean(jnp.linalg.norm(p - target, axis=-1))  # noqa: E731
-    return {"reconstruction_cm": error(rebuilt), "mean_pose_cm": error(mean)}
+    places, scale, unit = poses, 1.0, "error"
+    if parents:
+        rotations = matrix_from_6d(poses) if representation == "6d" else matrix_from_axis_angle(poses)
+        places, scale, unit = joint_positions(rotations, offsets, parents), 100.0, "cm"
+    target, rebuilt, mean = places
+    error = lambda p: scale * jnp.mean(jnp.linalg.norm(p - target, axis=-1))  # noqa: E731
+    return {f"reconstruction_{unit}": error(rebuilt), f"mean_pose_{unit}": error(mean)}
 
 
 def collect_summary(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> Summary:

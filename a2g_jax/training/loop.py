@@ -125,7 +125,7 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
         changed += [
             f"{name}: {before.get(name)}, now {value}"
             for name, value in now[part].items()
-            if name not in free and before.get(name) != value
+            if name not in free and before.get(name, value) != value
         ]
     if values["corpus"].get("fingerprint") != config.corpus["fingerprint"]:
         changed.append("the corpus")
@@ -168,29 +168,30 @@ def _programs(model: Model, settings: TrainConfig, crops: Crops, config: RunConf
     frames = model.clip_frames
     dressing = Dressing(config.statistics["audio"], settings.augmentation)
 
-    def finish(state: TrainState, audio, pose) -> tuple[TrainState, Metrics]:
+    def finish(state: TrainState, audio, pose, labels) -> tuple[TrainState, Metrics]:
         _, dress_key, model_key = step_keys(state.key, state.step)
-        return advance(model, settings, state, dressing(dress_key, audio, pose), model_key)
+        return advance(model, settings, state, dressing(dress_key, audio, pose, labels), model_key)
 
     def starts(state: TrainState):
         return draw_starts(step_keys(state.key, state.step)[0], crops, settings.batch_size)
 
     @partial(jax.jit, donate_argnums=0)
-    def on_device(state: TrainState, audio, pose):
+    def on_device(state: TrainState, audio, pose, labels):
         rows = starts(state)
-        return finish(state, gather(audio, rows, frames), gather(pose, rows, frames))
+        return finish(state, gather(audio, rows, frames), gather(pose, rows, frames), labels[rows])
 
     choose = jax.jit(starts)
     compute = jax.jit(finish, donate_argnums=0)
 
     def on(data: Corpus | Part) -> _Step:
         if (data.audio.nbytes + data.pose.nbytes) / 1e6 <= settings.device_megabytes:
-            audio, pose = jax.device_put(np.asarray(data.audio)), jax.device_put(np.asarray(data.pose))
-            return lambda state: on_device(state, audio, pose)
+            held = [jax.device_put(np.asarray(array)) for array in (data.audio, data.pose, data.labels)]
+            return lambda state: on_device(state, *held)
 
         def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
             rows = np.asarray(choose(state))
-            return compute(state, gather_from_disk(data.audio, rows, frames), gather_from_disk(data.pose, rows, frames))
+            clips = [gather_from_disk(array, rows, frames) for array in (data.audio, data.pose)]
+            return compute(state, *clips, data.labels[rows])
 
         return from_disk
 

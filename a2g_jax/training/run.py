@@ -11,7 +11,8 @@ from flax.traverse_util import flatten_dict, unflatten_dict
 
 from a2g_jax import __version__
 from a2g_jax.config import from_json
-from a2g_jax.data.corpus import Corpus, skeleton_from_json, skeleton_to_json
+from a2g_jax.data.corpus import Corpus, body_from_json, body_to_json
+from a2g_jax.data.poses import PoseLayout
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
@@ -37,11 +38,25 @@ class RunConfig:
     train_config: TrainConfig
     fps: float
     mel: MelConfig
-    skeleton: Skeleton
+    body: Skeleton | PoseLayout
+    """What the rows of a pose are."""
+    representation: str
+    """How a pose is written down: see :mod:`a2g_jax.data.representation`."""
     statistics: dict[str, Statistics]
     """``audio``, ``pose`` and ``root`` of the corpus's training split."""
     corpus: dict[str, Any]
-    """Fingerprint, recipe and length of the corpus."""
+    """Fingerprint, recipe, length, emotions and speakers of the corpus."""
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton that moves.
+
+        Raises:
+            InputError: the model makes keypoints or directions.
+        """
+        if not isinstance(self.body, Skeleton):
+            raise InputError(f"{self.model} was trained on {self.representation}, which have no skeleton.")
+        return self.body
 
     @classmethod
     def of(cls, model: str, preset: str, model_config: Any, train_config: TrainConfig, corpus: Corpus) -> "RunConfig":
@@ -55,14 +70,33 @@ class RunConfig:
             "fingerprint": corpus.fingerprint,
             "recipe": corpus.recipe,
             "seconds": corpus.frames / corpus.fps,
+            "emotions": list(corpus.emotions),
+            "speakers": list(corpus.speakers),
         }
         return cls(
-            model, preset, model_config, train_config, corpus.fps, corpus.mel, corpus.skeleton, corpus.statistics, about
+            model=model,
+            preset=preset,
+            model_config=model_config,
+            train_config=train_config,
+            fps=corpus.fps,
+            mel=corpus.mel,
+            body=corpus.body,
+            representation=corpus.representation,
+            statistics=corpus.statistics,
+            corpus=about,
         )
 
     def build(self) -> Model:
         """The model's functions."""
-        data = Data(self.skeleton, self.fps, self.mel.width, self.statistics["pose"])
+        data = Data(
+            self.body,
+            self.fps,
+            self.mel.width,
+            self.statistics["pose"],
+            self.representation,
+            tuple(self.corpus.get("emotions", ())),
+            tuple(self.corpus.get("speakers", ())),
+        )
         return find_model(self.model).build(self.model_config, data)
 
 
@@ -106,7 +140,8 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         "train_config": asdict(config.train_config),
         "fps": config.fps,
         "mel": asdict(config.mel),
-        "skeleton": skeleton_to_json(config.skeleton),
+        "pose": config.representation,
+        **body_to_json(config.body),
         "corpus": config.corpus,
     }
 
@@ -148,7 +183,8 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             train_config=from_json(TrainConfig, values["train_config"], str(about)),
             fps=float(values["fps"]),
             mel=from_json(MelConfig, values["mel"], str(about)),
-            skeleton=skeleton_from_json(values["skeleton"]),
+            body=body_from_json(values),
+            representation=str(values.get("pose", "6d")),
             statistics=statistics,
             corpus=values["corpus"],
         )

@@ -26,7 +26,8 @@ def corpus(**splits):
         path=Path("corpus"),
         fps=30.0,
         mel=MelConfig(),
-        skeleton=Skeleton(np.zeros((1, 3), np.float32), ("a",), (-1,)),
+        body=Skeleton(np.zeros((1, 3), np.float32), ("a",), (-1,)),
+        representation="6d",
         recordings=tuple(Entry(f"r{n}", int(firsts[n]), length, "", "", {}) for n, length in enumerate(LENGTHS)),
         splits={name: [Segment(*row) for row in rows] for name, rows in splits.items()},
         recipe={},
@@ -37,6 +38,8 @@ def corpus(**splits):
 TRAIN = [(0, 0, 12), (1, 0, 5), (2, 10, 25), (3, 0, 9)]
 #: Rows of the arrays at which a clip of six frames may start: recordings begin at rows 0, 12, 17 and 47.
 VALID = [*range(0, 7), *range(27, 37), *range(47, 51)]
+
+LABELS = jnp.array([[0, 2], [1, 0], [0, 1]], jnp.int32)
 
 draw = jax.jit(draw_starts, static_argnums=2)
 
@@ -99,20 +102,22 @@ class TestDressing:
     pose = jnp.ones((3, 7, 2, 6))
 
     def test_without_a_key_it_only_normalises(self):
-        dressed = Dressing(self.statistics, 1.0)(None, self.audio, self.pose)
+        dressed = Dressing(self.statistics, 1.0)(None, self.audio, self.pose, LABELS)
         np.testing.assert_allclose(dressed.audio, (np.asarray(self.audio) + 30) / 10, rtol=1e-5, atol=1e-5)
         assert dressed.pose is self.pose
+        assert (dressed.emotion.tolist(), dressed.speaker.tolist()) == ([0, 1, 0], [2, 0, 1])
 
     def test_without_strength_the_key_does_not_matter(self):
         dress = Dressing(self.statistics, 0.0)
         np.testing.assert_array_equal(
-            dress(jax.random.key(0), self.audio, self.pose).audio, dress(None, self.audio, self.pose).audio
+            dress(jax.random.key(0), self.audio, self.pose, LABELS).audio,
+            dress(None, self.audio, self.pose, LABELS).audio,
         )
 
     def test_every_clip_is_augmented_differently(self):
         same = jnp.broadcast_to(self.audio[:1], self.audio.shape)
         dress = jax.jit(Dressing(self.statistics, 1.0))
-        result = np.asarray(dress(jax.random.key(0), same, self.pose).audio)
+        result = np.asarray(dress(jax.random.key(0), same, self.pose, LABELS).audio)
         assert np.abs(result[0] - result[1]).max() > 0.01
         assert np.abs(result[1] - result[2]).max() > 0.01
-        np.testing.assert_array_equal(result, dress(jax.random.key(0), same, self.pose).audio)
+        np.testing.assert_array_equal(result, dress(jax.random.key(0), same, self.pose, LABELS).audio)

@@ -95,7 +95,6 @@ WRONG = {
     "a.tsv, line 1: expected a time in seconds from 0 on; got '٣'": "0\t٣\ta\n",
     "a.tsv, line 1: expected a time in seconds from 0 on; got 99999999.0": "0\t99999999\ta\n",
     "a.tsv, line 2: ends at 1.0 s, before it starts at 2.0 s": "0\t1\ta\n2\t1\tb\n",
-    "a.tsv, line 1: expected a word; got ' '": "0\t1\t \n",
     "a.tsv: is not UTF-8 text (byte 4)": b"0\t1\t\xff\n",
     "a.json: the file: expected a list as Google": "{}",
     "a.json: result 1: expected 'alternatives'": "[{}]",

@@ -12,6 +12,17 @@ from a2g_jax.errors import InputError
 
 _MODULES: dict[str, str] = {
     "folder": "folder",
+    "trinity": "trinity",
+    "genea2022": "genea2022",
+    "genea2023": "genea2023",
+    "beat": "beat",
+    "beat2": "beat2",
+    "zeroeggs": "zeroeggs",
+    "ted": "ted",
+    "ted-expressive": "ted_expressive",
+    "s2g": "s2g",
+    "pats": "pats",
+    "show": "show",
 }
 """Which module reads the data set of a name."""
 

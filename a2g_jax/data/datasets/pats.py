@@ -109,6 +109,7 @@ DATASET = DataSet(
     fps=FPS,
     find=find,
     read=read,
+    pose="keypoints",
     about=(
         "From chahuja.com/pats, CC BY-NC 2.0, with the speech of the videos that it lists. cmu_intervals_df.csv, whose"
         " column 'dataset' is the official split, processed/<speaker>/<interval>.h5 and raw/<speaker>_cropped/. Needs"

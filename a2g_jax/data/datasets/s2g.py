@@ -226,6 +226,7 @@ DATASET = DataSet(
     fps=FPS,
     find=find,
     read=read,
+    pose="keypoints",
     about=(
         "From github.com/amirbar/speech2gesture, with the speech of the videos that it lists. train.csv and"
         " <speaker>/train/npz/ as its code extracts them; train and dev of the table are the official split."

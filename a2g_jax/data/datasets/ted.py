@@ -37,6 +37,7 @@ DATASET = DataSet(
     fps=15.0,
     find=find,
     read=read,
+    pose="directions",
     about=(
         "From github.com/ai4r/Gesture-Generation-from-Trimodal-Context; the talks are TED's (CC BY-NC-ND 4.0). LMDB"
         " databases lmdb_train, lmdb_val and lmdb_test, which are the official split. 9 bone directions."

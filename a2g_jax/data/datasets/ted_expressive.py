@@ -100,6 +100,7 @@ DATASET = DataSet(
     fps=FPS,
     find=find,
     read=read,
+    pose="directions",
     about=(
         "From github.com/alvinliu0/HA2G; the talks are TED's (CC BY-NC-ND 4.0). LMDB databases lmdb_train, lmdb_val and"
         " lmdb_test, which are the official split, or one .npz a clip. 42 bone directions, with fingers."

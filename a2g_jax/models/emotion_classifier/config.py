@@ -1,0 +1,41 @@
+"""Settings of the emotion classifiers."""
+
+from dataclasses import dataclass
+
+from a2g_jax.errors import InputError
+
+
+@dataclass(frozen=True)
+class EmotionClassifierConfig:
+    """A convolutional network over time, an average over the clip, and a perceptron (EmotionGesture, Sec. 4)."""
+
+    input: str = "motion"
+    """What it looks at: 'motion' or 'audio'."""
+    channels: tuple[int, ...] = (128, 128, 128, 128)
+    """Residual blocks."""
+    hidden: int = 128
+    """Width of the perceptron's hidden layer."""
+    kernel_size: int = 3
+    dropout: float = 0.2
+    clip_frames: int = 60
+    """Frames in a clip: EmotionGesture's 60 are four seconds at 15 frames a second."""
+
+    def __post_init__(self) -> None:
+        if self.input not in ("motion", "audio"):
+            raise InputError(f"--input: expected 'motion' or 'audio'; got {self.input!r}.")
+        if not self.channels or min(self.channels) < 1:
+            raise InputError(f"--channels: expected numbers above 0 such as 64,64; got {self.channels}.")
+        if self.hidden < 1:
+            raise InputError(f"--hidden: expected 1 or more; got {self.hidden}.")
+        if self.kernel_size < 1 or self.kernel_size % 2 == 0:
+            raise InputError(f"--kernel-size: expected an odd number; got {self.kernel_size}.")
+        if not 0 <= self.dropout < 1:
+            raise InputError(f"--dropout: expected 0 or more and below 1; got {self.dropout}.")
+        if self.clip_frames < 2:
+            raise InputError(f"--clip-frames: expected 2 or more; got {self.clip_frames}.")
+
+
+PRESETS: dict[str, EmotionClassifierConfig] = {
+    "paper": EmotionClassifierConfig(),
+    "tiny": EmotionClassifierConfig(channels=(64, 64, 64), hidden=64),
+}

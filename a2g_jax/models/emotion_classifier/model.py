@@ -1,0 +1,108 @@
+"""The emotion classifiers as a record of pure functions."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import linen as nn
+from jaxtyping import Array, Float, Int, Key
+
+from a2g_jax.errors import InputError
+from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
+from a2g_jax.nn.tcn import TCN, receptive_halo
+
+
+class Classifier(nn.Module):
+    """Residual blocks over time; mean and spread over the clip; two linear layers."""
+
+    channels: Sequence[int]
+    hidden: int
+    kernel_size: int
+    dropout: float
+    classes: int
+
+    @nn.compact
+    def __call__(self, x: Float[Array, "B T C"], deterministic: bool = True) -> Float[Array, "B K"]:
+        x = TCN(self.channels, self.kernel_size, self.dropout)(x, deterministic)
+        # The epsilon keeps the gradient of the root finite where a channel does not move.
+        spread = jnp.sqrt(jnp.var(x, axis=1) + 1e-6)
+        seen = jnp.concatenate([jnp.mean(x, axis=1), spread], axis=-1)
+        seen = nn.Dropout(self.dropout)(nn.relu(nn.Dense(self.hidden)(seen)), deterministic=deterministic)
+        logits: Float[Array, "B K"] = nn.Dense(self.classes)(seen)
+        return logits
+
+
+def classify(
+    config: EmotionClassifierConfig, data: Data, params: Params, batch: Batch, dropout_key: Key[Array, ""] | None = None
+) -> Float[Array, "B K"]:
+    """Logits over ``data.emotions`` for every clip; dropout acts only when given a key."""
+    network = _network(config, data)
+    if config.input == "audio":
+        seen = batch.audio
+    else:
+        seen = data.pose_statistics.normalise(batch.pose).reshape(*batch.pose.shape[:2], -1)
+    rngs = None if dropout_key is None else {"dropout": dropout_key}
+    logits: Any = network.apply({"params": params}, seen, dropout_key is None, rngs=rngs)
+    return logits
+
+
+def _network(config: EmotionClassifierConfig, data: Data) -> Classifier:
+    return Classifier(config.channels, config.hidden, config.kernel_size, config.dropout, len(data.emotions))
+
+
+def build(config: EmotionClassifierConfig, data: Data) -> Model:
+    """A classifier of a corpus's emotions; see :class:`a2g_jax.models.base.Model` for its parts.
+
+    Raises:
+        InputError: the corpus has fewer than two emotions.
+    """
+    if len(data.emotions) < 2:
+        raise InputError(
+            f"emotion_classifier: the corpus has {len(data.emotions)} emotion ({', '.join(data.emotions) or 'none'});"
+            " prepare one with two or more."
+        )
+    width = data.audio_bands
+    if config.input == "motion":
+        rows = data.pose_statistics.mean.shape
+        width = rows[0] * rows[1]
+
+    def init(key: Key[Array, ""]) -> Params:
+        params: Params = _network(config, data).init(key, jnp.zeros((1, 8, width)))["params"]
+        return params
+
+    def loss(
+        params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+    ) -> tuple[Float[Array, ""], dict[str, Array]]:
+        """Cross entropy; accuracy beside it."""
+        del step
+        return entropy(params, batch, key if config.dropout > 0 else None)
+
+    def validation_loss(
+        params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+    ) -> tuple[Float[Array, ""], dict[str, Array]]:
+        """The same without dropout."""
+        del key, step
+        return entropy(params, batch, None)
+
+    def entropy(params: Params, batch: Batch, dropout_key: Key[Array, ""] | None):
+        if batch.emotion is None:
+            raise ValueError("a batch for the emotion classifier needs emotions")
+        logits = classify(config, data, params, batch, dropout_key)
+        loss = jnp.mean(optax.softmax_cross_entropy_with_integer_labels(logits, batch.emotion))
+        right = jnp.mean((jnp.argmax(logits, axis=-1) == batch.emotion).astype(jnp.float32))
+        return loss, {"accuracy": right}
+
+    def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
+        """The probability given to each clip's own emotion."""
+        del key
+        probabilities = jax.nn.softmax(classify(config, data, params, batch))
+        assert batch.emotion is not None
+        return {"confidence": jnp.take_along_axis(probabilities, batch.emotion[:, None], axis=1)[:, 0]}
+
+    halo = receptive_halo(len(config.channels), config.kernel_size)
+    return Model(
+        "emotion_classifier", config, config.clip_frames, halo, init, loss, summarise, None, None, None, validation_loss
+    )

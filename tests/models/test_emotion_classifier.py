@@ -1,0 +1,65 @@
+"""Classifiers of emotions: they learn from what they look at, and from nothing else."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+import pytest
+
+from a2g_jax.data.poses import PoseLayout
+from a2g_jax.errors import InputError
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.emotion_classifier import EmotionClassifierConfig, build, classify
+
+LAYOUT = PoseLayout(("a", "b"), ((0, 1),))
+STATISTICS = Statistics(np.zeros((2, 2), np.float32), np.ones((2, 2), np.float32))
+DATA = Data(LAYOUT, 15.0, 3, STATISTICS, "keypoints", ("anger", "neutral", "sadness"))
+
+
+def batch(seed, clips=24):
+    """Emotion k makes both audio and motion swing k + 1 times as fast."""
+    random = np.random.default_rng(seed)
+    emotion = random.integers(0, 3, clips)
+    phase = random.uniform(0, 6, clips)[:, None] + np.arange(20) * 0.4 * (emotion[:, None] + 1)
+    audio = np.repeat(np.sin(phase)[..., None], 3, axis=-1)
+    pose = np.tile(np.cos(phase)[..., None, None], (1, 1, 2, 2))
+    return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32), jnp.asarray(emotion, jnp.int32))
+
+
+@pytest.mark.parametrize("looks_at", ["motion", "audio"])
+def test_it_learns_emotions_from_its_input_alone(looks_at):
+    config = EmotionClassifierConfig(looks_at, channels=(16, 16), hidden=16, dropout=0.1, clip_frames=20)
+    model = build(config, DATA)
+    params = model.init(jax.random.key(0))
+    optimiser = optax.adam(5e-3)
+
+    @jax.jit
+    def step(params, state, seen, key):
+        gradient = jax.grad(lambda p: model.loss(p, key, seen, jnp.int32(0))[0])(params)
+        updates, state = optimiser.update(gradient, state)
+        return optax.apply_updates(params, updates), state
+
+    state = optimiser.init(params)
+    for number in range(120):
+        params, state = step(params, state, batch(number), jax.random.key(number))
+    held = batch(10_000, clips=60)
+    right = lambda seen: float(model.validation_loss(params, jax.random.key(0), seen, jnp.int32(0))[1]["accuracy"])  # noqa: E731
+    assert right(held) > 0.9
+    other = "audio" if looks_at == "motion" else "pose"
+    assert right(held._replace(**{other: jnp.zeros_like(getattr(held, other))})) == right(held)
+
+
+def test_dropout_acts_in_training_only():
+    config = EmotionClassifierConfig(channels=(8,), hidden=8, dropout=0.5, clip_frames=20)
+    model = build(config, DATA)
+    params, seen = model.init(jax.random.key(0)), batch(0)
+    losses = {float(model.loss(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)}
+    held = {float(model.validation_loss(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)}
+    assert (len(losses), len(held)) == (3, 1)
+    assert classify(config, DATA, params, seen).shape == (24, 3)
+
+
+def test_one_emotion_is_nothing_to_learn():
+    with pytest.raises(InputError, match=r"the corpus has 1 emotion \(neutral\); prepare one with two or more"):
+        build(EmotionClassifierConfig(), DATA._replace(emotions=("neutral",)))
