@@ -171,6 +171,12 @@ def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
         facts["corpus"]["generated in training"] = f"{corpus.parts - 1} more parts"
     if isinstance(corpus.body, Skeleton):
         facts["skeleton"] = skeleton_facts(corpus.body, rig)
+    else:
+        names = corpus.body.names
+        facts["points"] = {
+            "names": list(names),
+            "bones": [f"{names[start]}-{names[end]}" for start, end in corpus.body.bones],
+        }
     return facts
 
 

@@ -91,3 +91,10 @@ def test_nothing_to_compare(heard):
     still = clean(0).motion
     still = replace(still, rotations=np.repeat(np.asarray(still.rotations)[:1], 600, axis=0))
     assert find_copies([motion_print(still), motion_print(still)]) == []
+
+
+def test_the_same_room_is_not_the_same_speech():
+    """Equal noise in the pauses, a hum say, is no copy."""
+    hum = (np.random.default_rng(3).normal(size=20 * RATE) * 2e-3).astype(np.float32)
+    apart = [np.where(np.arange(20 * RATE) // RATE % 4 < 2, clean(number).audio, np.float32(0)) for number in (0, 3)]
+    assert find_copies([audio_print(audio + hum, RATE) for audio in apart]) == []

@@ -10,7 +10,9 @@ import pytest
 from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
 
 from a2g_jax.data.corpus import MANIFEST
+from a2g_jax.data.poses import PoseLayout, PoseTrack
 from a2g_jax.data.prepare import prepare_recording, write_corpus
+from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.inspection.command import inspect
@@ -166,6 +168,27 @@ def test_nan_in_a_corpus(tmp_path):
     (found,) = (x for x in inspect(path).findings if x.severity == "warning")
     assert (found.code, found.place.recording) == ("nan", "1")
     assert "[100, 3, 2]" in found.message
+
+
+def test_corpus_without_a_skeleton(tmp_path):
+    points = np.random.default_rng(0).normal(size=(2, 600, 3, 2)).astype(np.float32)
+    layout = PoseLayout(("hip", "neck", "hand"), ((0, 1), (1, 2)))
+    recordings = [
+        PoseRecording(
+            name=str(number),
+            audio=clean(number).audio,
+            sample_rate=16000,
+            motion=PoseTrack("keypoints", values, layout, 30.0),
+        )
+        for number, values in enumerate((points[0], points[1], points[0]))
+    ]
+    features = Features(pose="keypoints")
+    rows = (prepare_recording(recording, features) for recording in recordings)
+    write_corpus(tmp_path / "corpus", rows, features=features, recipe={"reader": "s2g"})
+    report = inspect(tmp_path / "corpus")
+    assert report.facts["points"]["bones"] == ["hip-neck", "neck-hand"]
+    (found,) = report.findings
+    assert (found.code, found.place.recording) == ("leak", "2")  # three recordings are split in time
 
 
 def test_late_motion_in_a_corpus(tmp_path):
