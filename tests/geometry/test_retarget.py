@@ -293,3 +293,13 @@ def test_an_invented_end_of_a_hand_points_anywhere():
         there = retarget(dataclasses.replace(motion, skeleton=skeleton), truth.skeleton)
         off = angle(world(there)[1:, theirs["L_Wrist"]], world(truth)[1:, theirs["L_Wrist"]])
         assert off == pytest.approx(turn if follows else 0.0, abs=0.1)
+
+
+def test_a_rig_without_legs_is_measured_by_its_arms():
+    """Height from the lowest joint to the highest would call half a body a child's, in another unit."""
+    from a2g_jax.data.talker.recordings import talk
+    from a2g_jax.data.talker.views.upper_body import upper_body
+
+    rig = find_rig(upper_body(talk(3.0, 0, fingers=True).motion))
+    assert rig.unit_factor == 1.0
+    assert 1.5 < rig.height < 2.0

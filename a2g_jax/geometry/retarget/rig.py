@@ -24,6 +24,8 @@ _AXES = {"X": 0, "Y": 1, "Z": 2}
 #: Metres in a unit, and the factor that mends lengths read in metres or centimetres when the file meant it.
 _UNITS = (("metres", 1.0), ("inches", 2.54), ("millimetres", 0.1), ("feet", 0.3048), ("decimetres", 10.0))
 _ADULT = (1.2, 2.3)
+#: An adult's height over the length of the arm without the hand (Drillis and Contini 1966: 0.186 + 0.146 of height).
+_ARMS_IN_HEIGHT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ class Rig:
     world: Float[np.ndarray, "3 3"]
     """``R_world_body`` of a person who faces forward in the world of the rig's motions: columns left, up, forward."""
     height: float
-    """From the lowest point to the highest of the reference pose, along the body, as read (metres if rightly read)."""
+    """From the lowest point to the highest of the reference pose, along the body, as read (metres if rightly read);
+    of a rig without legs, what an adult with such arms has."""
     notes: tuple[str, ...]
     """How the reference pose, the axes and the unit were found."""
 
@@ -104,6 +107,8 @@ def find_rig(
     spine, neck = _trunk(skeleton, roles)
     heights = places @ body[:, 1]
     height = float(heights.max() - heights.min())
+    if "L_Ankle" not in roles or "R_Ankle" not in roles:
+        height = _ARMS_IN_HEIGHT * _arm_length(places, roles)
     notes += (f"up is {_axis_name(axes[:, 1])}, forward {_axis_name(axes[:, 2])}",)
     unit, factor = _guess_unit(height)
     notes += (f"{height:.2f} tall: lengths are {'right in metres' if factor == 1 else f'{unit}, times {factor}'}",)
@@ -311,6 +316,17 @@ def _world_axes(
         # By custom: forward is +Z where Y is up, -Y where Z is up.
         forward = {0: np.eye(3)[2], 1: np.eye(3)[2], 2: -np.eye(3)[1]}[int(np.argmax(np.abs(upward)))]
     return np.stack([np.cross(upward, forward), upward, forward], axis=1)
+
+
+def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> float:
+    """From shoulder over elbow to wrist, the mean of both sides."""
+    chain = ("Shoulder", "Elbow", "Wrist")
+    bones = [
+        places[roles[f"{side}_{end}"]] - places[roles[f"{side}_{start}"]]
+        for side in "LR"
+        for start, end in zip(chain, chain[1:], strict=False)
+    ]
+    return float(np.linalg.norm(bones, axis=-1).sum() / 2)
 
 
 def _guess_unit(height: float) -> tuple[str, float]:
