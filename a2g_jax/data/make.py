@@ -86,6 +86,11 @@ def prepare_data_set(
     takes = reader.find(folder)
     if limit is not None and limit < len(takes):
         takes = [takes[number * len(takes) // limit] for number in range(limit)]
+    if official and takes and all(take.split in ("validation", "test") for take in takes):
+        raise InputError(
+            f"{folder}: by the authors' split all {len(takes)} recordings are for testing and validation, none for"
+            " training; add training recordings, or split by the seed with --random-split."
+        )
     read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken)
     items = [Item(take.name, take.sources) for take in takes]
     recipe = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}

@@ -232,7 +232,7 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
     parts = [entry.split if plan.official else "" for entry in entries]
     splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
     if not splits["train"]:
-        raise InputError(f"{path}: no recording is for training (parts: {', '.join(sorted(set(parts)))}); split anew.")
+        raise InputError(f"{path}: no recording is left for training; add some, or split by the seed (--random-split).")
     _write_statistics(folder, entries, splits)
     files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
     if plan.parts:

@@ -131,6 +131,19 @@ def test_broken_recordings_end_the_work_or_are_left_out(tmp_path, folder, capsys
     assert "take2.bvh" in skipped["reason"]
 
 
+def test_testing_recordings_alone_are_refused_before_any_work(tmp_path, folder, capsys):
+    source = tmp_path / "2"
+    source.mkdir()
+    for suffix in (".wav", ".bvh"):
+        (source / f"2_scott_0_1_1{suffix}").write_bytes((folder / f"take0{suffix}").read_bytes())
+    out = tmp_path / "corpus"
+    assert main(["prepare", "beat", str(tmp_path), "--out", str(out), "--workers", "1"]) == 2
+    assert "split by the seed with --random-split" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [source]
+    assert main(["prepare", "beat", str(tmp_path), "--out", str(out), "--workers", "1", "--random-split"]) == 0
+    assert [len(Corpus.open(out).splits[part]) for part in ("train", "validation", "test")] == [1, 1, 1]
+
+
 class TestOfficialSplits:
     def test_parts_stay_where_the_authors_put_them(self):
         parts = ["test", "train", "validation", "train", ""]
