@@ -1,6 +1,7 @@
 """The ``a2g`` command: parsing and printing only."""
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
@@ -193,10 +194,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         from a2g_jax import commands  # late: importing JAX takes seconds, and --help should not
 
-        return getattr(commands, f"run_{options.command}")(options, extra) or 0
+        status = getattr(commands, f"run_{options.command}")(options, extra) or 0
+        sys.stdout.flush()
+        return status
     except KeyboardInterrupt:
         print("a2g: interrupted", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        # Whoever read the output (head, a pager) has seen enough; Python would complain again when it flushes.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except Exception as error:
         if options.debug:
             raise

@@ -203,3 +203,10 @@ def test_any_rig_trains_as_it_is(capsys, tmp_path):
     assert main(train) == 0
     assert main(["generate", run, "--audio", str(tmp_path / "mine" / "fish.wav"), "--samples", "1", "--out", out]) == 0
     assert read_motion_npz(tmp_path / "out" / "sample_00.npz").frames == round(8.0 * 23.976)
+
+
+def test_output_that_nobody_reads_to_the_end_is_no_error(tmp_path):
+    """As where the output goes into ``head``."""
+    script = f"{sys.executable} -m a2g_jax.cli prepare --list | (exec 0<&-; sleep 0.1)"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.stderr == ""

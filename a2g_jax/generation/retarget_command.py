@@ -34,7 +34,6 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         seen, layout = read_with_layout(Path(options.to))
         target = find_rig(seen, name=options.to)
     match = match_rigs(source, target)
-    print(match.table())
     moved = mirror(motion, source) if options.mirror else motion
     moved = retarget(moved, match)
     moved = moved if options.fps is None else resample(moved, options.fps)
@@ -43,6 +42,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         write_bvh(out, moved)
     else:
         missed = write_like(out, moved, layout)
+    print(match.table())
     print(f"{out}: {moved.frames} frames of {moved.skeleton.joints} joints at {moved.fps:g} fps")
     for joint, degrees in missed.items():
         print(f"{joint} has too few rotation channels in the target: off by up to {degrees:.1f} degrees")

@@ -86,9 +86,9 @@ class RunConfig:
             corpus=about,
         )
 
-    def build(self) -> Model:
-        """The model's functions."""
-        data = Data(
+    def data(self) -> Data:
+        """What the model is built for."""
+        return Data(
             self.body,
             self.fps,
             self.mel.width,
@@ -97,7 +97,10 @@ class RunConfig:
             tuple(self.corpus.get("emotions", ())),
             tuple(self.corpus.get("speakers", ())),
         )
-        return find_model(self.model).build(self.model_config, data)
+
+    def build(self) -> Model:
+        """The model's functions."""
+        return find_model(self.model).build(self.model_config, self.data())
 
 
 @dataclass(frozen=True, eq=False)

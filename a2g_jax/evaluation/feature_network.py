@@ -1,0 +1,74 @@
+"""The trained network whose features learned metrics compare."""
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import sha256_file
+from a2g_jax.models.motion_autoencoder import encode
+from a2g_jax.training.run import WEIGHTS_FILE, Run, load_run
+
+#: Which residual block's features FID looks at: the fourth (Audio2Gestures, extended, Sec. 5.1).
+FID_BLOCK = 3
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureNetwork:
+    """A trained motion autoencoder."""
+
+    run: Run
+    fingerprint: str
+    """SHA-256 of its weights: scores by networks of different fingerprints cannot be compared."""
+
+    @property
+    def clip_frames(self) -> int:
+        """Frames of a clip, of which one feature vector is taken."""
+        frames: int = self.run.config.model_config.clip_frames
+        return frames
+
+    @cached_property
+    def _blocks(self) -> Any:
+        config = self.run.config
+        data = config.data()
+        return jax.jit(lambda params, pose: encode(config.model_config, data, params, pose))
+
+    def blocks(self, pose: Float[np.ndarray, "B T R D"]) -> list[Float[np.ndarray, "B T _"]]:
+        """Features of every residual block, frame by frame."""
+        return [np.asarray(block) for block in self._blocks(self.run.params, jnp.asarray(pose))]
+
+    def clip_features(self, pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, "n F"]:
+        """Time-averaged features of the fourth block, for clips one after another; a remainder is left out."""
+        count = len(pose) // self.clip_frames
+        clips = pose[: count * self.clip_frames].reshape(count, self.clip_frames, *pose.shape[1:])
+        if count == 0:
+            return np.zeros((0, self.run.config.model_config.encoder_channels[FID_BLOCK]), np.float32)
+        return self.blocks(np.asarray(clips, np.float32))[FID_BLOCK].mean(axis=1)
+
+
+def load_feature_network(folder: str | os.PathLike[str], corpus: Corpus) -> FeatureNetwork:
+    """A run of ``motion_autoencoder`` that looks at such poses as a corpus has.
+
+    Raises:
+        InputError: not a run, one of another model, or one for other joints, poses or frame rate.
+    """
+    run = load_run(folder)
+    config = run.config
+    if config.model != "motion_autoencoder":
+        raise InputError(f"{folder}: is a run of {config.model}; a feature network is one of motion_autoencoder.")
+    there = (config.representation, config.statistics["pose"].mean.shape, config.fps)
+    here = (corpus.representation, corpus.statistics["pose"].mean.shape, corpus.fps)
+    if there != here:
+        raise InputError(
+            f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
+            f" at {here[2]:g} fps; train one on such a corpus."
+        )
+    return FeatureNetwork(run, sha256_file(Path(folder) / WEIGHTS_FILE))
