@@ -205,9 +205,10 @@ def run_train(options: argparse.Namespace, extra: list[str]) -> None:
         if getattr(options, name) is None:
             raise InputError(f"--{name} is needed (see 'a2g train --help').")
     run = run_training(options.model, options.preset, model, training, options.corpus, options.out, options.resume)
-    print(
-        f"{options.out}: trained for {run.steps} steps; next: a2g generate {options.out} --audio speech.wav --out DIR"
-    )
+    following = f"a2g generate {options.out} --audio speech.wav --out DIR"
+    if run.config.build().sample is None:
+        following = f"a2g inspect {options.out}"
+    print(f"{options.out}: trained for {run.steps} steps; next: {following}")
 
 
 def run_training(

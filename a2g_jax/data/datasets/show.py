@@ -42,7 +42,9 @@ def find(folder: Path) -> list[Take]:
     """A take for each pickle, in the order of the paths."""
     pickles = files_with(folder, ".pkl", f"a folder that is {_EXPECTED}")
     if not any(path.with_suffix(".wav").is_file() for path in pickles):
-        raise InputError(f"{folder}: has no .pkl with a .wav of the same name beside it; name a folder that is {_EXPECTED}.")
+        raise InputError(
+            f"{folder}: has no .pkl with a .wav of the same name beside it; name a folder that is {_EXPECTED}."
+        )
     return unique_names([_take(path) for path in pickles])
 
 
