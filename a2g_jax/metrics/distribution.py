@@ -1,0 +1,94 @@
+"""Distances between sets of motions: of deep features (FID, FGD), and of speeds."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+Features = Float[np.ndarray, "_ F"]
+
+
+class FrechetDistance(NamedTuple):
+    """A Fréchet distance with the numbers of samples that it is of: it falls as they grow, for equal distributions."""
+
+    value: float
+    samples: int
+    reference: int
+
+
+def frechet_distance(features: Features, reference: Features) -> FrechetDistance:
+    """Fréchet distance of the Gaussians through two sets of features (Audio2Gestures, extended, Eq. 25).
+
+    NaN where a feature is NaN.
+
+    Raises:
+        ValueError: fewer than two vectors in a set, or vectors of different lengths.
+    """
+    for name, values in (("features", features), ("reference", reference)):
+        if len(values) < 2:
+            raise ValueError(f"expected two or more vectors of {name} for a covariance; got {len(values)}")
+    moments = [(values.mean(axis=0), _covariance(values)) for values in (_double(features), _double(reference))]
+    return FrechetDistance(gaussian_distance(*moments[0], *moments[1]), len(features), len(reference))
+
+
+def gaussian_distance(
+    mean: Float[np.ndarray, " F"],
+    covariance: Float[np.ndarray, "F F"],
+    other_mean: Float[np.ndarray, " F"],
+    other_covariance: Float[np.ndarray, "F F"],
+) -> float:
+    """``|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2))`` in float64.
+
+    The trace of the root is the sum of the singular values of ``C1^(1/2) C2^(1/2)``, so that no complex root of a
+    product that is only nearly positive can come up.
+    """
+    if not all(np.isfinite(part).all() for part in (mean, covariance, other_mean, other_covariance)):
+        return float("nan")
+    root, other_root = _root(covariance), _root(other_covariance)
+    cross = np.linalg.svd(root @ other_root, compute_uv=False).sum()
+    distance = np.sum((mean - other_mean) ** 2) + np.trace(covariance) + np.trace(other_covariance) - 2.0 * cross
+    return float(max(distance, 0.0))
+
+
+def split_floor(reference: Features, rng: np.random.Generator, repeats: int = 10) -> FrechetDistance:
+    """What two halves of one set are apart by, on average over random halvings: as near as that many samples can
+    come.
+    """
+    if len(reference) < 4:
+        raise ValueError(f"expected four or more vectors to halve; got {len(reference)}")
+    half, values = len(reference) // 2, []
+    for _ in range(repeats):
+        order = rng.permutation(len(reference))
+        values.append(frechet_distance(reference[order[:half]], reference[order[half : 2 * half]]).value)
+    return FrechetDistance(float(np.mean(values)), half, half)
+
+
+def speed_hellinger(
+    speeds: Float[np.ndarray, " n"], reference: Float[np.ndarray, " m"], width: float = 0.05, most: float = 3.0
+) -> float:
+    """Hellinger distance of histograms of speeds, 0 to 1 (as in the GENEA challenges).
+
+    Args:
+        width: of a bin, in the unit of the speeds; bins are the same for whatever is compared.
+        most: speeds beyond it share one bin.
+    """
+    if np.isnan(speeds).any() or np.isnan(reference).any():
+        return float("nan")
+    edges = np.append(np.arange(0.0, most + width / 2, width), np.inf)
+    first, second = (np.histogram(np.abs(values), edges)[0] / max(1, len(values)) for values in (speeds, reference))
+    # By rounding, the sum of roots may exceed one.
+    return float(np.sqrt(max(0.0, 1.0 - np.sum(np.sqrt(first * second)))))
+
+
+def _double(values: Features) -> Features:
+    return np.asarray(values, np.float64)
+
+
+def _covariance(values: Features) -> Float[np.ndarray, "F F"]:
+    return np.atleast_2d(np.cov(values, rowvar=False))
+
+
+def _root(matrix: Float[np.ndarray, "F F"]) -> Float[np.ndarray, "F F"]:
+    """Square root of a symmetric matrix, whose tiny negative eigenvalues count as zero."""
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

@@ -1,0 +1,41 @@
+"""How sure a mean over clips is."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+
+class Interval(NamedTuple):
+    """A mean with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    clips: int
+
+
+def bootstrap_mean(values: Float[np.ndarray, " clips"], rng: np.random.Generator, draws: int = 2000) -> Interval:
+    """Mean over clips with the percentile bootstrap's 95 % interval; NaN values are left out, and not counted.
+
+    With one clip there is no interval: its ends are NaN.
+    """
+    values = np.asarray(values, np.float64)
+    values = values[~np.isnan(values)]
+    if len(values) == 0:
+        return Interval(float("nan"), float("nan"), float("nan"), 0)
+    if len(values) == 1:
+        return Interval(float(values[0]), float("nan"), float("nan"), 1)
+    means = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
+    low, high = np.percentile(means, [2.5, 97.5])
+    return Interval(float(values.mean()), float(low), float(high), len(values))
+
+
+def bootstrap_difference(
+    values: Float[np.ndarray, " clips"],
+    others: Float[np.ndarray, " clips"],
+    rng: np.random.Generator,
+    draws: int = 2000,
+) -> Interval:
+    """Mean difference of two candidates on the same clips, by drawing clips: pairs that share a clip share its ease."""
+    return bootstrap_mean(np.asarray(values, np.float64) - np.asarray(others, np.float64), rng, draws)

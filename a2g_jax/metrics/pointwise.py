@@ -1,0 +1,65 @@
+"""Scores that compare a motion with a target frame by frame and joint by joint.
+
+Positions are (..., T, J, D) with D of 2 or 3, in any unit: results are in it. A NaN anywhere in a motion makes its
+score NaN; nothing is left out silently. Seed frames that a model was given should be cut off before scoring.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from a2g_jax.geometry.rotation import geodesic_distance
+
+Positions = Float[Array | np.ndarray, "*batch T J D"]
+Rotations = Float[Array | np.ndarray, "*batch T J 3 3"]
+
+#: From wrist to wrist of Audio2Gestures' skeleton in T-pose, metres (extended paper, Eq. 23).
+REFERENCE_WRIST_TO_WRIST = 1.2064
+
+
+def position_l1(predicted: Positions, target: Positions) -> Float[Array, "*batch"]:
+    """Mean over frames and joints of the L1 norm of a joint's error (Audio2Gestures, extended, Eq. 22)."""
+    return jnp.mean(jnp.sum(jnp.abs(predicted - target), axis=-1), axis=(-2, -1))
+
+
+def position_l1_star(
+    predicted: Positions, target: Positions, wrist_to_wrist: float, reference: float = REFERENCE_WRIST_TO_WRIST
+) -> Float[Array, "*batch"]:
+    """:func:`position_l1` as it would be on a skeleton of the reference size (Eq. 23).
+
+    Args:
+        wrist_to_wrist: of the skeleton in T-pose, in the unit of ``reference``.
+    """
+    return position_l1(predicted, target) * (reference / wrist_to_wrist)
+
+
+def position_l2(predicted: Positions, target: Positions) -> Float[Array, "*batch"]:
+    """Mean over frames and joints of a joint's distance from where it should be (EmotionGesture's L2)."""
+    return jnp.mean(jnp.linalg.norm(predicted - target, axis=-1), axis=(-2, -1))
+
+
+def speed_l1(predicted: Positions, target: Positions, fps: float = 1.0) -> Float[Array, "*batch"]:
+    """:func:`position_l1` of velocities ``(p[t+1] - p[t]) fps``; with ``fps`` 1 the paper's units a frame."""
+    return fps * position_l1(jnp.diff(predicted, axis=-3), jnp.diff(target, axis=-3))
+
+
+def acceleration_l1(predicted: Positions, target: Positions, fps: float = 1.0) -> Float[Array, "*batch"]:
+    """:func:`position_l1` of second differences times ``fps**2``."""
+    return fps**2 * position_l1(jnp.diff(predicted, n=2, axis=-3), jnp.diff(target, n=2, axis=-3))
+
+
+def pck(predicted: Positions, target: Positions, threshold: float) -> Float[Array, "*batch"]:
+    """Percentage of correct keypoints, as a share: joints nearer than ``threshold`` to their targets (Eq. 24).
+
+    Args:
+        threshold: in the unit of the positions. Audio2Gestures has 0.2, the flow paper's code 0.1 of TED's units.
+    """
+    distance = jnp.linalg.norm(predicted - target, axis=-1)
+    share = jnp.mean((distance < threshold).astype(predicted.dtype), axis=(-2, -1))
+    # A comparison with NaN is false, which would count a broken motion as merely wrong.
+    return jnp.where(jnp.any(jnp.isnan(distance), axis=(-2, -1)), jnp.nan, share)
+
+
+def joint_rotation_error(predicted: Rotations, target: Rotations) -> Float[Array, "*batch"]:
+    """MPJRE: mean over frames and joints of the geodesic angle between rotations, degrees (EmotionGesture)."""
+    return jnp.rad2deg(jnp.mean(geodesic_distance(jnp.asarray(predicted), jnp.asarray(target)), axis=(-2, -1)))
