@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 
 from a2g_jax import __version__
 from a2g_jax.errors import A2GError, Interrupted
+from a2g_jax.evaluation import arguments as evaluation
 from a2g_jax.generation import retarget_arguments as retargeting
 from a2g_jax.inspection import arguments as inspection
 
@@ -173,6 +174,9 @@ def make_parser() -> argparse.ArgumentParser:
 
     inspect = command("inspect", inspection.DESCRIPTION)
     inspection.add_arguments(inspect)
+
+    evaluate = command("evaluate", evaluation.DESCRIPTION)
+    evaluation.add_arguments(evaluate)
 
     retarget = command("retarget", retargeting.DESCRIPTION)
     retargeting.add_arguments(retarget)

@@ -19,6 +19,7 @@ from a2g_jax.data.settings import PRESETS, Features, find_features
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
+from a2g_jax.evaluation import command as evaluate_command
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation import retarget_command
 from a2g_jax.generation.deliver import check_formats, deliver
@@ -218,6 +219,12 @@ def run_training(
     _cache_compilations()
     opened = Corpus.open(corpus)
     return train(RunConfig.of(name, preset, model, training, opened), opened, out, resume=resume)
+
+
+def run_evaluate(options: argparse.Namespace, extra: list[str]) -> None:
+    """``a2g evaluate``."""
+    _cache_compilations()
+    evaluate_command.run(options, extra)
 
 
 def run_inspect(options: argparse.Namespace, extra: list[str]) -> int:

@@ -1,0 +1,212 @@
+"""A table of candidates on a split: models, the truth, and what is neither."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from a2g_jax import __version__
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.splits import Segment
+from a2g_jax.errors import InputError
+from a2g_jax.evaluation import candidates
+from a2g_jax.evaluation.feature_network import FeatureNetwork
+from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Pose, Scorer, Target
+from a2g_jax.generation.generate import Generator
+from a2g_jax.metrics.beats import mel_onsets
+from a2g_jax.metrics.distribution import frechet_distance, split_floor
+from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.training.run import Run
+
+#: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
+MOST_FRAMES = 5000
+
+#: What is scored beside the models, in the order of the table.
+BASELINES = (
+    "truth",
+    "another right motion",
+    "truth, 1 degree of noise",
+    "truth, 5 degrees of noise",
+    "nearest neighbour in audio",
+    "another clip's motion",
+    "mean pose",
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Scores of one candidate."""
+
+    name: str
+    samples: int
+    """Motions for each clip."""
+    scores: dict[str, dict[str, Any]]
+    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, averaged over clips)."""
+
+
+def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
+    """Refuse runs whose motion cannot be compared on a corpus.
+
+    Raises:
+        InputError: another skeleton, frame rate or audio feature.
+    """
+    corpus.require_pose("6d")
+    for name, run in runs.items():
+        config = run.config
+        if not config.skeleton.same_tree(corpus.skeleton):
+            raise InputError(f"{name}: moves another skeleton than {corpus.path} has; train one on such a corpus.")
+        if config.fps != corpus.fps or config.mel != corpus.mel:
+            raise InputError(
+                f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, otherwise made than the"
+                f" {corpus.mel.width} at {corpus.fps:g} fps of {corpus.path}; prepare that with its features."
+            )
+
+
+def evaluate(
+    runs: dict[str, Run],
+    corpus: Corpus,
+    *,
+    split: str = "test",
+    samples: int = 20,
+    seed: int = 0,
+    network: FeatureNetwork | None = None,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """Score runs and baselines; JSON-able.
+
+    Args:
+        samples: motions that each run makes for each clip.
+        network: without one, FGD and LPIPS are left out.
+        report: called with how many (candidate, clip) pairs are done, of how many.
+
+    Raises:
+        InputError: runs that do not fit the corpus, or a split without a stretch long enough.
+    """
+    check_runs(runs, corpus)
+    segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= 100]
+    if not segments:
+        raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
+    scorer = Scorer(corpus.skeleton, corpus.fps, network)
+    targets = [_target(corpus, scorer, segment) for segment in segments]
+    reference = np.concatenate([scorer.features(target.pose) for target in targets])
+    total, done, rows = (len(runs) + len(BASELINES)) * len(segments), 0, []
+    for name, draw in _candidates(runs, corpus, segments, samples, seed):
+        per_clip: list[list[dict[str, float]]] = []
+        spread, features, count = [], [], 0
+        for number, target in enumerate(targets):
+            poses = draw(number)
+            done += 1
+            report(done, total)
+            if poses is None:
+                continue
+            count = len(poses)
+            per_clip.append([scorer.sample(pose, target) for pose in poses])
+            spread.append(scorer.multimodality(poses))
+            features.append([scorer.features(pose) for pose in poses])
+        if per_clip:
+            rows.append(Row(name, count, _summary(per_clip, spread, features, reference, seed)))
+    about = {
+        "package": __version__,
+        "corpus": corpus.fingerprint,
+        "recipe": {key: value for key, value in corpus.recipe.items() if key != "roles"},
+        "split": split,
+        "clips": len(segments),
+        "seconds": sum(segment.frames for segment in segments) / corpus.fps,
+        "samples": samples,
+        "seed": seed,
+        "skeleton": _fingerprint(corpus),
+        "feature_network": None if network is None else network.fingerprint,
+        "feature_vectors": len(reference),
+        "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
+    }
+    return {"about": about, "rows": [asdict(row) for row in rows]}
+
+
+def _cut(segment: Segment) -> Segment:
+    return Segment(segment.recording, segment.start, min(segment.stop, segment.start + MOST_FRAMES))
+
+
+def _target(corpus: Corpus, scorer: Scorer, segment: Segment) -> Target:
+    pose = np.asarray(corpus.pose[segment.start : segment.stop])
+    onsets = mel_onsets(np.asarray(corpus.audio[segment.start : segment.stop]), corpus.fps)
+    return Target(pose, scorer.positions(pose), onsets)
+
+
+_Draw = Callable[[int], list[Pose] | None]
+
+
+def _candidates(
+    runs: dict[str, Run], corpus: Corpus, segments: list[Segment], samples: int, seed: int
+) -> Iterator[tuple[str, _Draw]]:
+    """Each candidate's name, and the function that gives its motions for a clip (None if there are none)."""
+    for name, run in runs.items():
+        generator = Generator(run)
+
+        def model(number: int, generator: Generator = generator) -> list[Pose]:
+            segment = segments[number]
+            audio = np.asarray(corpus.audio[segment.start : segment.stop])
+            # A seed of its own for every clip, so that clips are independent draws.
+            motions = generator.stream_features(audio, samples, (seed + 7919 * (number + 1)) % 2**31)
+            return [_rows(np.asarray(motion.rotations)) for motion in motions]
+
+        yield name, model
+    truth = lambda number: np.asarray(corpus.pose[segments[number].start : segments[number].stop])  # noqa: E731
+    noise = lambda number, degrees: candidates.with_noise(  # noqa: E731
+        truth(number), degrees, np.random.default_rng([seed, number])
+    )
+    baselines: tuple[_Draw, ...] = (
+        lambda number: [truth(number)],
+        lambda number: candidates.right_motions(corpus, segments[number], samples, seed),
+        lambda number: [noise(number, 1.0)],
+        lambda number: [noise(number, 5.0)],
+        lambda number: [candidates.nearest_neighbour(corpus, segments[number])],
+        lambda number: [candidates.other_clip(corpus, segments, number)],
+        lambda number: [candidates.mean_pose(corpus, segments[number])],
+    )
+    yield from zip(BASELINES, baselines, strict=True)
+
+
+def _rows(rotations: np.ndarray) -> Pose:
+    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6)
+
+
+def _summary(
+    per_clip: list[list[dict[str, float]]],
+    spread: list[float],
+    features: list[list[np.ndarray]],
+    reference: np.ndarray,
+    seed: int,
+) -> dict[str, dict[str, Any]]:
+    """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips."""
+    rng = np.random.default_rng(seed)
+    summary: dict[str, dict[str, Any]] = {}
+    for name in PER_SAMPLE:
+        values = np.array([[scores.get(name, np.nan) for scores in clip] for clip in per_clip])
+        if np.isnan(values).all():
+            continue
+        interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
+        best = {"lower": np.nanmin, "higher": np.nanmax}.get(METRICS[name].better)
+        summary[name] = {
+            "mean": interval.mean,
+            "low": interval.low,
+            "high": interval.high,
+            "best": None if best is None else float(np.mean(best(values, axis=1))),
+        }
+    if not np.isnan(spread).all():
+        interval = bootstrap_mean(np.array(spread), rng)
+        summary["multimodality"] = {**interval._asdict(), "best": None}
+    if len(reference) >= 2:
+        # One set of features for each sample number, over all clips, so that n is that of the truth.
+        sets = [np.concatenate([clip[sample] for clip in features]) for sample in range(len(features[0]))]
+        distances = [frechet_distance(vectors, reference).value for vectors in sets]
+        summary["fgd"] = {"mean": float(np.mean(distances)), "low": None, "high": None, "best": float(min(distances))}
+    return summary
+
+
+def _fingerprint(corpus: Corpus) -> str:
+    skeleton = corpus.skeleton
+    value = [list(skeleton.names), list(skeleton.parents), np.round(np.asarray(skeleton.offsets), 4).tolist()]
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]

@@ -1,0 +1,171 @@
+"""The table of an evaluation as JSON, Markdown, LaTeX and a picture."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from a2g_jax.errors import InputError
+from a2g_jax.evaluation.scores import METRICS
+from a2g_jax.io.files import atomic_path, make_folder
+
+_ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
+_LATEX_ARROWS = {"lower": r"$\downarrow$", "higher": r"$\uparrow$", "truth": r"$\approx$"}
+
+
+def write_report(result: dict[str, Any], out: Path) -> list[Path]:
+    """Write ``report.json``, ``report.md``, ``report.tex`` and, where Matplotlib is installed, ``report.png``."""
+    make_folder(out)
+    texts = {
+        "report.json": json.dumps(result, indent=1) + "\n",
+        "report.md": markdown(result),
+        "report.tex": latex(result),
+    }
+    written = []
+    for name, text in texts.items():
+        with atomic_path(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        written.append(out / name)
+    try:
+        import matplotlib  # noqa: F401 - optional
+    except ImportError:
+        return written
+    _picture(result, out / "report.png")
+    return [*written, out / "report.png"]
+
+
+def markdown(result: dict[str, Any]) -> str:
+    """The table with what it is of and how it is read."""
+    about, names = result["about"], _metrics(result)
+    head = [f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in names]
+    lines = ["| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(names) + 2)]
+    for row in result["rows"]:
+        cells = [_cell(row["scores"].get(name), name) for name in names]
+        lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
+    return "\n".join([*_preface(about), "", *lines, "", *_notes(about), ""])
+
+
+def latex(result: dict[str, Any]) -> str:
+    """A table for a paper (needs booktabs): means and, behind them in brackets, the best of the samples."""
+    names = _metrics(result)
+    head = " & ".join(["", *(f"{METRICS[name].title} {_LATEX_ARROWS[METRICS[name].better]}" for name in names)])
+    lines = [r"\begin{tabular}{l" + "r" * len(names) + "}", r"\toprule", head + r" \\", r"\midrule"]
+    for row in result["rows"]:
+        cells = []
+        for name in names:
+            score, digits = row["scores"].get(name), METRICS[name].digits
+            if score is None:
+                cells.append("--")
+                continue
+            best = f" ({score['best']:.{digits}f})" if row["samples"] > 1 and score["best"] is not None else ""
+            cells.append(f"{score['mean']:.{digits}f}{best}")
+        name = row["name"].replace("_", r"\_").replace("&", r"\&").replace("%", r"\%")
+        lines.append(" & ".join([name, *cells]) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
+
+
+def check_comparable(results: dict[str, dict[str, Any]]) -> None:
+    """Refuse to put reports side by side that are not of the same thing.
+
+    Args:
+        results: contents of ``report.json`` files by their names.
+
+    Raises:
+        InputError: of different skeletons, corpora, splits, numbers of samples or feature networks.
+    """
+    (first, reference), *others = results.items()
+    for name, result in others:
+        for key in ("skeleton", "corpus", "split", "samples", "feature_network"):
+            here, there = reference["about"].get(key), result["about"].get(key)
+            if here != there:
+                raise InputError(
+                    f"{first} and {name}: cannot be compared: {key.replace('_', ' ')} is {here} in one and {there} in"
+                    " the other; evaluate both in the same way."
+                )
+
+
+def _metrics(result: dict[str, Any]) -> list[str]:
+    there = {name for row in result["rows"] for name in row["scores"]}
+    return [name for name in METRICS if name in there]
+
+
+def _unit(name: str) -> str:
+    return f", {METRICS[name].unit}" if METRICS[name].unit else ""
+
+
+def _cell(score: dict[str, Any] | None, name: str) -> str:
+    if score is None:
+        return "-"
+    digits = METRICS[name].digits
+    text = f"{score['mean']:.{digits}f}"
+    if score["low"] is not None and score["low"] == score["low"]:
+        text += f" [{score['low']:.{digits}f}, {score['high']:.{digits}f}]"
+    if score["best"] is not None and score["best"] != score["mean"]:
+        text += f" best {score['best']:.{digits}f}"
+    return text
+
+
+def _preface(about: dict[str, Any]) -> list[str]:
+    return [
+        f"# Evaluation on the {about['split']} split",
+        "",
+        f"{about['clips']} clips, {about['seconds']:.0f} s; {about['samples']} samples of each model for each clip,"
+        f" seed {about['seed']}; corpus {about['corpus'][:16]} ({about['recipe'].get('reader')}); package"
+        f" {about['package']}.",
+    ]
+
+
+def _notes(about: dict[str, Any]) -> list[str]:
+    few = " There are few clips, so intervals are wide and understate what is not known." if about["clips"] < 10 else ""
+    notes = [
+        "Brackets hold 95 % intervals over clips (bootstrap)." + few,
+        "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",
+        "↓ less is better, ↑ more is better, ≈ as the truth is better. Beat alignment has no zero: see what the other"
+        " rows score. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at 20.",
+        "No score here is a claim about what people would prefer.",
+    ]
+    if about["feature_network"] is not None:
+        floor = "" if about["floor"] is None else f" two halves of the truth are {about['floor']:.2f} apart;"
+        notes.append(
+            f"FGD and LPIPS are by the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
+            f" vectors a set;{floor} FGD falls with n."
+        )
+    return [f"- {note}" for note in notes]
+
+
+def _picture(result: dict[str, Any], path: Path) -> None:
+    """One panel for each metric, one bar with its interval for each row."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    names, rows = _metrics(result), result["rows"]
+    columns = 4
+    lines = -(-len(names) // columns)
+    height = 0.24 * len(rows) + 0.7
+    figure, axes = pyplot.subplots(
+        lines, columns, figsize=(13, lines * height), sharey=True, squeeze=False, layout="constrained"
+    )
+    models = len(rows) - sum(row["samples"] <= 1 or "right" in row["name"] for row in rows)
+    for panel, name in zip(axes.flat, names, strict=False):
+        for place, row in enumerate(rows):
+            score = row["scores"].get(name)
+            if score is None:
+                continue
+            colour = "#2f6fde" if place < models else "#b7c0cc"
+            panel.barh(place, score["mean"], color=colour, height=0.7)
+            if score["low"] is not None:
+                panel.plot([score["low"], score["high"]], [place, place], color="#1b2433", linewidth=1.4)
+        values = sorted(row["scores"][name]["mean"] for row in rows if name in row["scores"])
+        if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
+            panel.set_xlim(0, 1.6 * values[-2])  # one row beyond all others would flatten them
+        panel.set_title(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}", fontsize=9)
+        panel.tick_params(labelsize=8)
+        panel.spines[["top", "right"]].set_visible(False)
+    for panel in list(axes.flat)[len(names) :]:
+        panel.set_visible(False)
+    axes[0, 0].set_yticks(range(len(rows)), [row["name"] for row in rows])
+    axes[0, 0].invert_yaxis()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=110, format="png")
+    pyplot.close(figure)
