@@ -25,6 +25,8 @@ CONTENDERS: dict[str, tuple[str, str, int | None]] = {
     "Speech2Gesture windows, 49 keypoints, one a core": ("s2g", "all", None),
 }
 
+_SOURCES = "recordings to prepare"
+
 
 def main() -> None:
     """Measure every contender and print a table."""
@@ -32,17 +34,25 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60.0, help="of recordings in all")
     parser.add_argument("--takes", type=int, default=12)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--contender", choices=CONTENDERS, help=argparse.SUPPRESS)
+    parser.add_argument("--contender", choices=[*CONTENDERS, _SOURCES], help=argparse.SUPPRESS)
     parser.add_argument("--sources", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--out", type=Path, help="JSON file to write (default: in results/)")
     options = parser.parse_args()
+    if options.contender == _SOURCES:
+        _write_sources(options.sources, options)
+        measure.report({})
+        return
     if options.contender:
         measure.report(_prepare(options))
         return
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder)
-        _write_sources(sources, options)
-        arguments = [f"--sources={sources}", f"--minutes={options.minutes}"]
+        arguments = [
+            f"--sources={sources}",
+            *(f"--{name}={getattr(options, name)}" for name in ("minutes", "takes", "seed")),
+        ]
+        # In a process of its own: a child inherits its parent's peak, and this one would count in every row.
+        measure.run_alone("experiments.benchmarks.preparing", _SOURCES, arguments)
         rows = [
             {"contender": name, **measure.run_alone("experiments.benchmarks.preparing", name, arguments)}
             for name in CONTENDERS
