@@ -9,7 +9,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.rows import prepare_recording
@@ -23,6 +23,8 @@ Pose = Float[np.ndarray, "T J 6"]
 
 #: Seconds of audio that are looked up at once in the training split.
 NEIGHBOUR_SECONDS = 4.0
+#: Stretches compared at once: bounds memory at about 50 MB.
+_CHUNK = 1500
 
 
 def mean_pose(corpus: Corpus, segment: Segment) -> Pose:
@@ -59,26 +61,42 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
     """The training motion whose audio is most like this one's, four seconds at a time.
 
     Distance is that of normalised log-mel rows; training audio is tried at every half second.
+
+    Raises:
+        InputError: no training stretch is that long.
     """
-    window = max(2, round(NEIGHBOUR_SECONDS * corpus.fps))
+    window = min(segment.frames, round(NEIGHBOUR_SECONDS * corpus.fps))
     step = max(1, round(0.5 * corpus.fps))
-    statistics = corpus.statistics["audio"]
     starts = np.array(
         [row for one in corpus.segments("train") for row in range(one.start, one.stop - window + 1, step)], np.int64
     )
     if len(starts) == 0:
-        raise InputError(f"{corpus.path}: has no training stretch of {NEIGHBOUR_SECONDS:g} s to look neighbours up in.")
-    audio = np.asarray(statistics.normalise(np.asarray(corpus.audio[segment.start : segment.stop])), np.float32)
-    parts = []
-    for first in range(0, segment.frames, window):
-        wanted = audio[first : first + window]
-        distances = np.empty(len(starts))
-        for index, start in enumerate(starts):
-            there = statistics.normalise(np.asarray(corpus.audio[start : start + len(wanted)]))
-            distances[index] = np.mean(np.square(there - wanted))
-        best = starts[int(np.argmin(distances))]
-        parts.append(np.asarray(corpus.pose[best : best + len(wanted)]))
-    return np.concatenate(parts)
+        raise InputError(f"{corpus.path}: has no training stretch of {window} frames to look neighbours up in.")
+    # The last stretch ends with the clip, and overlaps the one before it.
+    firsts = [*range(0, segment.frames - window + 1, window)]
+    if firsts[-1] + window < segment.frames:
+        firsts.append(segment.frames - window)
+    wanted = _windows(corpus, segment.start + np.array(firsts), window)
+    best, least = np.zeros(len(firsts), np.int64), np.full(len(firsts), np.inf)
+    for chunk in range(0, len(starts), _CHUNK):
+        some = starts[chunk : chunk + _CHUNK]
+        there = _windows(corpus, some, window)
+        # |a - b|^2 without |b|^2, which is the same for all.
+        distance = np.sum(np.square(there), axis=1)[:, None] - 2.0 * there @ wanted.T
+        nearest = np.argmin(distance, axis=0)
+        values = distance[nearest, np.arange(len(firsts))]
+        best = np.where(values < least, some[nearest], best)
+        least = np.minimum(values, least)
+    pose = np.empty((segment.frames, *corpus.pose.shape[1:]), np.float32)
+    for first, start in zip(firsts, best, strict=True):
+        pose[first : first + window] = corpus.pose[start : start + window]
+    return pose
+
+
+def _windows(corpus: Corpus, starts: Int[np.ndarray, " n"], frames: int) -> Float[np.ndarray, "n values"]:
+    """Normalised audio rows from each start on, side by side."""
+    rows = np.asarray(corpus.audio)[starts[:, None] + np.arange(frames)[None]]
+    return np.asarray(corpus.statistics["audio"].normalise(rows), np.float32).reshape(len(starts), -1)
 
 
 def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> list[Pose] | None:
