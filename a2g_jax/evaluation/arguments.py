@@ -16,6 +16,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--features", metavar="RUN", help="a run of motion_autoencoder, for FGD and LPIPS (default: these are left out)"
     )
+    parser.add_argument(
+        "--audit",
+        action="store_true",
+        help="also see whether each run listens: late audio, other audio, silence, loudness",
+    )
     parser.add_argument("--split", default="test", help="of the corpus (default: test)")
     parser.add_argument("--samples", type=int, default=20, help="motions of each run for each clip (default: 20)")
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn (default: 0)")

@@ -42,6 +42,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
             samples=options.samples,
             seed=options.seed,
             network=network,
+            audit=options.audit,
             report=report,
         )
     written = write_report(result, Path(options.out))

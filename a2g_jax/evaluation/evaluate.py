@@ -13,6 +13,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import candidates
+from a2g_jax.evaluation.audit import Heard, listening_audit
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Pose, Scorer, Target
 from a2g_jax.generation.generate import Generator
@@ -23,6 +24,8 @@ from a2g_jax.training.run import Run
 
 #: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
 MOST_FRAMES = 5000
+#: How much is generated again and again to see whether a model listens.
+_AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
 
 #: What is scored beside the models, in the order of the table.
 BASELINES = (
@@ -73,6 +76,7 @@ def evaluate(
     samples: int = 20,
     seed: int = 0,
     network: FeatureNetwork | None = None,
+    audit: bool = False,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Score runs and baselines; JSON-able.
@@ -80,6 +84,7 @@ def evaluate(
     Args:
         samples: motions that each run makes for each clip.
         network: without one, FGD and LPIPS are left out.
+        audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
         report: called with how many (candidate, clip) pairs are done, of how many.
 
     Raises:
@@ -122,7 +127,25 @@ def evaluate(
         "feature_vectors": len(reference),
         "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
     }
-    return {"about": about, "rows": [asdict(row) for row in rows]}
+    audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}
+    return {"about": about, "rows": [asdict(row) for row in rows], "audits": audits}
+
+
+def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], seed: int) -> dict[str, Any]:
+    """On the first half minute of a few clips."""
+    generator, chosen = Generator(run), segments[:_AUDIT_CLIPS]
+    frames = [min(segment.frames, round(_AUDIT_SECONDS * corpus.fps)) for segment in chosen]
+    clips = [
+        np.asarray(corpus.audio[segment.start : segment.start + count])
+        for segment, count in zip(chosen, frames, strict=True)
+    ]
+    speakers = [corpus.recordings[segment.recording].speaker for segment in chosen]
+
+    def listen(heard: Heard, number: int) -> np.ndarray:
+        motion = next(generator.stream_features(np.asarray(heard.features, np.float32), 1, (seed + number) % 2**31))
+        return scorer.wrists(scorer.positions(_rows(np.asarray(motion.rotations))))
+
+    return listening_audit(listen, clips, speakers, corpus.fps)
 
 
 def _cut(segment: Segment) -> Segment:

@@ -41,7 +41,8 @@ def markdown(result: dict[str, Any]) -> str:
     for row in result["rows"]:
         cells = [_cell(row["scores"].get(name), name) for name in names]
         lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
-    return "\n".join([*_preface(about), "", *lines, "", *_notes(about), ""])
+    audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
+    return "\n".join([*_preface(about), "", *lines, "", *_notes(about), "", *audits])
 
 
 def latex(result: dict[str, Any]) -> str:
@@ -81,6 +82,23 @@ def check_comparable(results: dict[str, dict[str, Any]]) -> None:
                     f"{first} and {name}: cannot be compared: {key.replace('_', ' ')} is {here} in one and {there} in"
                     " the other; evaluate both in the same way."
                 )
+
+
+def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
+    """Whether a run listens, as a section."""
+    lines = [
+        f"## Does {name} listen?",
+        "",
+        f"{'; '.join(audit['verdicts'])}. ({audit['clips']} clips; another seed changes the wrists' motion by"
+        f" {audit['sampling_cm']:.1f} cm.)",
+        "",
+        "| heard | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
+        "| --- | --- | --- | --- |",
+    ]
+    for condition, row in audit["conditions"].items():
+        share, agreement = f"{row['change_of_sampling']:.2f}", f"{row['agreement']:.3f}"
+        lines.append(f"| {condition} | {row['change_cm']:.1f} | {share} | {agreement} |")
+    return [*lines, ""]
 
 
 def _metrics(result: dict[str, Any]) -> list[str]:

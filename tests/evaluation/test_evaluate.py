@@ -99,8 +99,10 @@ def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config
     cell = table["rows"][0]["scores"]["position_l1"]
     assert cell["best"] < cell["mean"]
     assert table["rows"][0]["scores"]["multimodality"]["mean"] > 0
-    again = evaluate({"mine": run}, corpus, samples=3, network=network)
-    assert json.dumps(again) == json.dumps(table)
+    again = evaluate({"mine": run}, corpus, samples=3, network=network, audit=True)
+    assert json.dumps(again["rows"]) == json.dumps(table["rows"])
+    assert again["audits"]["mine"]["conditions"]["true audio"]["change_cm"] == 0.0
+    assert "## Does mine listen?" in markdown(again)
     other = dataclasses.replace(config, fps=25.0)
     with pytest.raises(InputError, match="mine: takes 64 audio values at 25 fps"):
         check_runs({"mine": dataclasses.replace(run, config=other)}, corpus)
