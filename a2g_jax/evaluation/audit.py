@@ -13,8 +13,8 @@ from scipy import ndimage
 
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speed_peaks
 
-LogMel = Float[np.ndarray, "T bands"]
-Places = Float[np.ndarray, "T J 3"]
+LogMel = Float[np.ndarray, "_ bands"]
+Places = Float[np.ndarray, "_ J 3"]
 
 #: Seconds by which audio is moved, in a circle.
 SHIFTS = (1.0, 2.0, 5.0)

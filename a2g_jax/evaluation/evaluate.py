@@ -24,6 +24,9 @@ from a2g_jax.training.run import Run
 
 #: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
 MOST_FRAMES = 5000
+#: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer stretches than this are cut into pieces
+#: of that length, so that there is anything to draw intervals from.
+_LEAST_FRAMES, _FEW = 100, 5
 #: How much is generated again and again to see whether a model listens.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
 
@@ -91,7 +94,10 @@ def evaluate(
         InputError: runs that do not fit the corpus, or a split without a stretch long enough.
     """
     check_runs(runs, corpus)
-    segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= 100]
+    segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= _LEAST_FRAMES]
+    stretches = len(segments)
+    if stretches < _FEW:
+        segments = [piece for segment in segments for piece in _pieces(segment)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
     scorer = Scorer(corpus.skeleton, corpus.fps, network)
@@ -119,6 +125,7 @@ def evaluate(
         "recipe": {key: value for key, value in corpus.recipe.items() if key != "roles"},
         "split": split,
         "clips": len(segments),
+        "stretches": stretches,
         "seconds": sum(segment.frames for segment in segments) / corpus.fps,
         "samples": samples,
         "seed": seed,
@@ -146,6 +153,13 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
         return scorer.wrists(scorer.positions(_rows(np.asarray(motion.rotations))))
 
     return listening_audit(listen, clips, speakers, corpus.fps)
+
+
+def _pieces(segment: Segment) -> list[Segment]:
+    """A stretch cut into clips of 100 frames, the last one longer by the remainder."""
+    starts = range(segment.start, segment.stop - 2 * _LEAST_FRAMES + 1, _LEAST_FRAMES)
+    bounds = [*starts, segment.start + len(starts) * _LEAST_FRAMES, segment.stop]
+    return [Segment(segment.recording, start, stop) for start, stop in zip(bounds, bounds[1:], strict=False)]
 
 
 def _cut(segment: Segment) -> Segment:

@@ -134,6 +134,11 @@ def _preface(about: dict[str, Any]) -> list[str]:
 
 def _notes(about: dict[str, Any]) -> list[str]:
     few = " There are few clips, so intervals are wide and understate what is not known." if about["clips"] < 10 else ""
+    if about["clips"] > about["stretches"]:
+        few = (
+            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals are"
+            " narrower than what is not known, and say nothing about other recordings or speakers."
+        )
     notes = [
         "Brackets hold 95 % intervals over clips (bootstrap)." + few,
         "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",

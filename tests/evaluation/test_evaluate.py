@@ -148,3 +148,11 @@ def test_the_command_writes_its_report(corpus, tmp_path, capsys):
     assert main([*command, "--split", "nothing"]) == 2
     assert "has no split 'nothing'" in capsys.readouterr().err
     assert main([*command, "--features", str(tmp_path)]) == 2
+
+
+def test_a_single_recording_is_scored_in_pieces_and_the_report_says_so(corpus):
+    one = dataclasses.replace(corpus, splits={"test": corpus.splits["train"][:1]})
+    pieces = evaluate({}, dataclasses.replace(one, splits={**one.splits, "train": corpus.splits["train"]}), samples=2)
+    assert (pieces["about"]["clips"], pieces["about"]["stretches"]) == (3, 1)
+    assert pieces["about"]["seconds"] == 12.0
+    assert "pieces of 1 recording(s), which are not independent" in markdown(pieces)
