@@ -68,10 +68,17 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
     window = min(segment.frames, round(NEIGHBOUR_SECONDS * corpus.fps))
     step = max(1, round(0.5 * corpus.fps))
     starts = np.array(
-        [row for one in corpus.segments("train") for row in range(one.start, one.stop - window + 1, step)], np.int64
+        [
+            row
+            for one in corpus.segments("train")
+            for row in range(one.start, one.stop - window + 1, step)
+            # Where the training split itself is scored, nothing is its own neighbour.
+            if row >= segment.stop or row + window <= segment.start
+        ],
+        np.int64,
     )
     if len(starts) == 0:
-        raise InputError(f"{corpus.path}: has no training stretch of {window} frames to look neighbours up in.")
+        raise InputError(f"{corpus.path}: has no other training stretch of {window} frames to look neighbours up in.")
     # The last stretch ends with the clip, and overlaps the one before it.
     firsts = [*range(0, segment.frames - window + 1, window)]
     if firsts[-1] + window < segment.frames:

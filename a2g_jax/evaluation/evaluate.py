@@ -97,7 +97,9 @@ def evaluate(
     segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= _LEAST_FRAMES]
     stretches = len(segments)
     if stretches < _FEW:
-        segments = [piece for segment in segments for piece in _pieces(segment)]
+        # Long enough for the feature network too.
+        least = _LEAST_FRAMES if network is None else max(_LEAST_FRAMES, network.clip_frames)
+        segments = [piece for segment in segments for piece in _pieces(segment, least)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
     scorer = Scorer(corpus.skeleton, corpus.fps, network)
@@ -155,10 +157,10 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
     return listening_audit(listen, clips, speakers, corpus.fps)
 
 
-def _pieces(segment: Segment) -> list[Segment]:
-    """A stretch cut into clips of 100 frames, the last one longer by the remainder."""
-    starts = range(segment.start, segment.stop - 2 * _LEAST_FRAMES + 1, _LEAST_FRAMES)
-    bounds = [*starts, segment.start + len(starts) * _LEAST_FRAMES, segment.stop]
+def _pieces(segment: Segment, frames: int) -> list[Segment]:
+    """A stretch cut into clips of so many frames, the last one longer by the remainder."""
+    starts = range(segment.start, segment.stop - 2 * frames + 1, frames)
+    bounds = [*starts, segment.start + len(starts) * frames, segment.stop]
     return [Segment(segment.recording, start, stop) for start, stop in zip(bounds, bounds[1:], strict=False)]
 
 
@@ -224,13 +226,15 @@ def _summary(
         values = np.array([[scores.get(name, np.nan) for scores in clip] for clip in per_clip])
         if np.isnan(values).all():
             continue
+        # A clip too short for a metric has no score in any sample.
+        values = values[~np.isnan(values).all(axis=1)]
         interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
         best = {"lower": np.nanmin, "higher": np.nanmax}.get(METRICS[name].better)
         summary[name] = {
             "mean": interval.mean,
             "low": interval.low,
             "high": interval.high,
-            "best": None if best is None else float(np.mean(best(values, axis=1))),
+            "best": None if best is None else float(np.nanmean(best(values, axis=1))),
         }
     if not np.isnan(spread).all():
         interval = bootstrap_mean(np.array(spread), rng)
