@@ -30,6 +30,7 @@ from a2g_jax.io.audio import read_audio
 from a2g_jax.models import find_model
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig
+from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, demo_run, load_run
 
@@ -205,7 +206,9 @@ def run_train(options: argparse.Namespace, extra: list[str]) -> None:
     for name in ("corpus", "out"):
         if getattr(options, name) is None:
             raise InputError(f"--{name} is needed (see 'a2g train --help').")
-    run = run_training(options.model, options.preset, model, training, options.corpus, options.out, options.resume)
+    run = run_training(
+        options.model, options.preset, model, training, options.corpus, options.out, options.resume, options.features
+    )
     following = f"a2g generate {options.out} --audio speech.wav --out DIR"
     if run.config.build().sample is None:
         following = f"a2g inspect {options.out}"
@@ -213,12 +216,20 @@ def run_train(options: argparse.Namespace, extra: list[str]) -> None:
 
 
 def run_training(
-    name: str, preset: str, model: Any, training: TrainConfig, corpus: str | Path, out: str | Path, resume: bool
+    name: str,
+    preset: str,
+    model: Any,
+    training: TrainConfig,
+    corpus: str | Path,
+    out: str | Path,
+    resume: bool,
+    features: str | Path | None = None,
 ) -> Run:
-    """Open the corpus and train."""
+    """Open the corpus and the feature network, and train."""
     _cache_compilations()
     opened = Corpus.open(corpus)
-    return train(RunConfig.of(name, preset, model, training, opened), opened, out, resume=resume)
+    perceptual = None if features is None else load_perceptual(features, opened)
+    return train(RunConfig.of(name, preset, model, training, opened, perceptual), opened, out, resume=resume)
 
 
 def run_evaluate(options: argparse.Namespace, extra: list[str]) -> None:

@@ -3,7 +3,6 @@
 import os
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -12,10 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.errors import InputError
-from a2g_jax.io.files import sha256_file
 from a2g_jax.models.motion_autoencoder import encode
-from a2g_jax.training.run import WEIGHTS_FILE, Run, load_run
+from a2g_jax.training.feature_run import load_feature_run
+from a2g_jax.training.run import Run
 
 #: Which residual block's features FID looks at: the fourth (Audio2Gestures, extended, Sec. 5.1).
 FID_BLOCK = 3
@@ -60,15 +58,4 @@ def load_feature_network(folder: str | os.PathLike[str], corpus: Corpus) -> Feat
     Raises:
         InputError: not a run, one of another model, or one for other joints, poses or frame rate.
     """
-    run = load_run(folder)
-    config = run.config
-    if config.model != "motion_autoencoder":
-        raise InputError(f"{folder}: is a run of {config.model}; a feature network is one of motion_autoencoder.")
-    there = (config.representation, config.statistics["pose"].mean.shape, config.fps)
-    here = (corpus.representation, corpus.statistics["pose"].mean.shape, corpus.fps)
-    if there != here:
-        raise InputError(
-            f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
-            f" at {here[2]:g} fps; train one on such a corpus."
-        )
-    return FeatureNetwork(run, sha256_file(Path(folder) / WEIGHTS_FILE))
+    return FeatureNetwork(*load_feature_run(folder, corpus))

@@ -20,7 +20,12 @@ class Entry(NamedTuple):
 
 
 MODELS: dict[str, Entry] = {
-    "audio2gestures": Entry(audio2gestures.Audio2GesturesConfig, audio2gestures.PRESETS, audio2gestures.build),
+    "audio2gestures": Entry(
+        audio2gestures.Audio2GesturesConfig,
+        audio2gestures.PRESETS,
+        audio2gestures.build,
+        ("6d", "directions", "keypoints"),
+    ),
     "motion_autoencoder": Entry(
         motion_autoencoder.MotionAutoencoderConfig, motion_autoencoder.PRESETS, motion_autoencoder.build, tuple(WIDTHS)
     ),

@@ -43,6 +43,8 @@ class Data(NamedTuple):
     """Of the corpus, in the order of their indices."""
     speakers: tuple[str, ...] = ()
     """Of the corpus, in the order of their indices."""
+    perceptual: Callable[[Float[Array, "B T R D"]], list[Array]] | None = None
+    """Features of poses, block by block, of a frozen feature network; for perceptual losses."""
 
     @property
     def skeleton(self) -> Skeleton:

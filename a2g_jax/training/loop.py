@@ -118,7 +118,11 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
     if not isinstance(values, dict) or values.get("format") != FORMAT or not isinstance(values.get("corpus"), dict):
         raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
     now = json.loads(json.dumps(run_to_json(config, 0)))
-    changed = [f"{key}: {values.get(key)}, now {now[key]}" for key in ("model", "fps") if values.get(key) != now[key]]
+    changed = [
+        f"{key.replace('_', ' ')}: {values.get(key)}, now {now[key]}"
+        for key in ("model", "fps", "feature_network")
+        if values.get(key) != now[key]
+    ]
     free_settings = _FREE if on_demand else _FREE | {"part_steps"}
     for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
         before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}

@@ -21,6 +21,7 @@ from a2g_jax.io.files import atomic_path, read_json, write_json
 from a2g_jax.models import find_model
 from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.training.config import TrainConfig
+from a2g_jax.training.feature_run import Perceptual, absent
 
 FORMAT = "a2g_jax run"
 VERSION = 1
@@ -46,6 +47,8 @@ class RunConfig:
     """``audio``, ``pose`` and ``root`` of the corpus's training split."""
     corpus: dict[str, Any]
     """Fingerprint, recipe, length, emotions and speakers of the corpus."""
+    perceptual: Perceptual | None = None
+    """The feature network of a perceptual loss."""
 
     @property
     def skeleton(self) -> Skeleton:
@@ -59,7 +62,15 @@ class RunConfig:
         return self.body
 
     @classmethod
-    def of(cls, model: str, preset: str, model_config: Any, train_config: TrainConfig, corpus: Corpus) -> "RunConfig":
+    def of(
+        cls,
+        model: str,
+        preset: str,
+        model_config: Any,
+        train_config: TrainConfig,
+        corpus: Corpus,
+        perceptual: Perceptual | None = None,
+    ) -> "RunConfig":
         """The run of a model on a corpus.
 
         Raises:
@@ -84,6 +95,7 @@ class RunConfig:
             representation=corpus.representation,
             statistics=corpus.statistics,
             corpus=about,
+            perceptual=perceptual,
         )
 
     def data(self) -> Data:
@@ -96,6 +108,7 @@ class RunConfig:
             self.representation,
             tuple(self.corpus.get("emotions", ())),
             tuple(self.corpus.get("speakers", ())),
+            None if self.perceptual is None else self.perceptual.features,
         )
 
     def build(self) -> Model:
@@ -146,6 +159,7 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         "pose": config.representation,
         **body_to_json(config.body),
         "corpus": config.corpus,
+        "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
     }
 
 
@@ -190,6 +204,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             representation=str(values.get("pose", "6d")),
             statistics=statistics,
             corpus=values["corpus"],
+            perceptual=absent(values["feature_network"]) if values.get("feature_network") else None,
         )
         steps = int(values["steps"])
     except InputError:

@@ -10,7 +10,8 @@ import pytest
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import audio2gestures
-from a2g_jax.models.audio2gestures.model import Networks
+from a2g_jax.models.audio2gestures import objective
+from a2g_jax.models.audio2gestures.codec import Networks
 from a2g_jax.models.base import Batch, Data
 
 torch = pytest.importorskip("torch")
@@ -154,7 +155,7 @@ def test_losses_and_gradients_agree_in_double_precision(x64):
 
 def test_loss_weights_agree():
     *_, twin = _setting(np.float32)
-    weights = audio2gestures.model._weights(CONFIG)(jnp.int32(30_000))
+    weights = objective.weights(CONFIG)(jnp.int32(30_000))
     assert {name: float(weight) for name, weight in weights.items()} == pytest.approx(twin.weights(30_000))
     assert set(weights) == set(TERMS)
 

@@ -14,7 +14,8 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.audio2gestures import PRESETS, build
-from a2g_jax.models.audio2gestures.model import _weights, code_noise
+from a2g_jax.models.audio2gestures.objective import code_noise
+from a2g_jax.models.audio2gestures.objective import weights as loss_weights
 from a2g_jax.models.base import Batch, Data
 
 CONFIG = replace(
@@ -114,7 +115,7 @@ class TestLoss:
 
 
 def test_schedules_of_zero_steps_are_constant():
-    weights = _weights(replace(CONFIG, kl_ramp_steps=0, diversity_decay_steps=0))
+    weights = loss_weights(replace(CONFIG, kl_ramp_steps=0, diversity_decay_steps=0))
     for step in (0, 10**9):
         assert weights(jnp.int32(step))["kl_shared"] == CONFIG.kl_shared_weight
         assert weights(jnp.int32(step))["kl_specific"] == CONFIG.kl_specific_weight
@@ -123,7 +124,7 @@ def test_schedules_of_zero_steps_are_constant():
 
 def test_long_schedules_keep_their_precision():
     config = replace(CONFIG, kl_ramp_steps=100_000, diversity_decay_steps=500_000)
-    weights = _weights(config)(jnp.int32(25_000))
+    weights = loss_weights(config)(jnp.int32(25_000))
     np.testing.assert_allclose(weights["kl_shared"], 0.25 * config.kl_shared_weight, rtol=1e-6)
     np.testing.assert_allclose(weights["diversity"], 0.95 * config.diversity_weight, rtol=1e-6)
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, fields
 
 from a2g_jax.errors import InputError
+from a2g_jax.models.audio2gestures.edits import parse_edit
+from a2g_jax.nn.noise import BLOCK
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,29 @@ class Audio2GesturesConfig:
     code_channels: int = 16
     """Width of the shared and of the motion-specific code."""
     dropout: float = 0.0
+    backbone: str = "tcn"
+    """Of both encoders: ``tcn``, ``gru`` or ``transformer`` (Sec. 6.2.4); the decoder is always a TCN."""
+    recurrent_layers: int = 5
+    """Bidirectional layers of the GRU backbone."""
+    recurrent_channels: int = 32
+    """Of a GRU layer, each direction."""
+    attention_layers: int = 5
+    """Of the Transformer backbone."""
+    attention_channels: int = 16
+    """Of query, key, value and everything between layers of the Transformer."""
+    attention_hidden: int = 256
+    """Of the two linear layers behind each attention."""
+    attention_window: int = 32
+    """Frames that a Transformer layer's attention reaches over, half of them before and half after."""
+    split: bool = True
+    """Whether there is a motion-specific code; without one audio and motion share all there is (Table 2, baseline)."""
+    mapping: bool = True
+    """Whether noise with the statistics of I_M goes through the mapping net; otherwise I_R is standard normal noise."""
+    latent: str = "time"
+    """``dct``: heads see the discrete cosine transform of the encoders' features (Sec. 6.3), and the shared code has no
+    variance."""
+    dct_points: int = 128
+    """Frames that are encoded and transformed together; training clips are a multiple of them."""
     normalise_pose: bool = False
     """Whether networks see and predict 6D rotations as z-scores of the training split; the papers use them raw."""
 
@@ -49,6 +74,12 @@ class Audio2GesturesConfig:
     """Of the rotation loss on motions with a random specific code; the authors' code has 1, the papers no such loss."""
     sampled_speed_weight: float = 0.0
     """Of the speed loss on motions with a random specific code; the authors' code has 5, the papers no such loss."""
+    stft_weight: float = 0.0
+    """Of the distance of spectra over short windows (Eq. 6), beside the motion reconstruction losses."""
+    ssim_weight: float = 0.0
+    """Of one minus the structural similarity over time (Eq. 7)."""
+    lpips_weight: float = 0.0
+    """Of the perceptual distance in a feature network (Eq. 14), which ``a2g train --features RUN`` names."""
     bicycle_weight: float = 0.1
     diversity_weight: float = 0.1
     diversity_decay_steps: int = 500_000
@@ -64,6 +95,8 @@ class Audio2GesturesConfig:
     """In generation, scale of the noise that becomes the specific code; lower is calmer, 1 is what training saw."""
     sample_codes: bool = True
     """In generation, draw codes from their posteriors, as the authors do; otherwise take their means (smoother)."""
+    edits: tuple[str, ...] = ()
+    """In generation, what is done to the codes' DCT bands: see :mod:`a2g_jax.models.audio2gestures.edits`."""
 
     def __post_init__(self) -> None:
         for name in ("audio_channels", "motion_channels", "decoder_channels"):
@@ -72,11 +105,36 @@ class Audio2GesturesConfig:
                 raise InputError(f"--{name.replace('_', '-')}: expected numbers above 0 such as 64,64; got {channels}.")
         if self.kernel_size < 1 or self.kernel_size % 2 == 0:
             raise InputError(f"--kernel-size: expected an odd number; got {self.kernel_size}.")
-        for name in ("head_channels", "code_channels"):
+        for name in (
+            "head_channels",
+            "code_channels",
+            "recurrent_layers",
+            "recurrent_channels",
+            "attention_layers",
+            "attention_channels",
+            "attention_hidden",
+            "dct_points",
+        ):
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
         if self.clip_frames < 2:
             raise InputError(f"--clip-frames: expected 2 or more, for speeds; got {self.clip_frames}.")
+        if self.attention_window < 2 or self.attention_window % 2:
+            raise InputError(f"--attention-window: expected an even number above 0; got {self.attention_window}.")
+        for name, known in (("backbone", ("tcn", "gru", "transformer")), ("latent", ("time", "dct"))):
+            if getattr(self, name) not in known:
+                raise InputError(f"--{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}.")
+        if self.latent == "dct" and self.clip_frames % self.dct_points:
+            raise InputError(
+                f"--clip-frames: expected a multiple of --dct-points {self.dct_points}; got {self.clip_frames}."
+            )
+        if self.latent == "dct" and not self.split:
+            raise InputError("--latent dct: needs --split true; the baseline has no DCT variant.")
+        if self.latent == "dct" and BLOCK % self.dct_points:
+            raise InputError(f"--dct-points: expected a divisor of {BLOCK}; got {self.dct_points}.")
+        for edit in self.edits:
+            if parse_edit(edit, self.dct_points).action == "swap":
+                raise InputError(f"edit {edit!r}: takes bands from another code, which only Python can give.")
         if not 0 <= self.dropout < 1:
             raise InputError(f"--dropout: expected 0 or more and below 1; got {self.dropout}.")
         for field in fields(self):
