@@ -80,6 +80,7 @@ def evaluate(
     seed: int = 0,
     network: FeatureNetwork | None = None,
     audit: bool = False,
+    baselines: bool = True,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Score runs and baselines; JSON-able.
@@ -87,6 +88,7 @@ def evaluate(
     Args:
         samples: motions that each run makes for each clip.
         network: without one, FGD and LPIPS are left out.
+        baselines: whether the rows beside the runs are scored too.
         audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
         report: called with how many (candidate, clip) pairs are done, of how many.
 
@@ -105,8 +107,10 @@ def evaluate(
     scorer = Scorer(corpus.skeleton, corpus.fps, network)
     targets = [_target(corpus, scorer, segment) for segment in segments]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
-    total, done, rows = (len(runs) + len(BASELINES)) * len(segments), 0, []
+    total, done, rows = (len(runs) + baselines * len(BASELINES)) * len(segments), 0, []
     for name, draw in _candidates(runs, corpus, segments, samples, seed):
+        if not baselines and name in BASELINES and name not in runs:
+            continue
         per_clip: list[list[dict[str, float]]] = []
         spread, features, count = [], [], 0
         for number, target in enumerate(targets):

@@ -1,0 +1,112 @@
+"""A table as Markdown: our rows, the paper's rows, the claims."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from a2g_jax.evaluation.scores import METRICS
+from experiments.audio2gestures.common import (
+    RESULTS,
+    Claim,
+    Variant,
+    arguments,
+    baselines,
+    best_over_seeds,
+    judge,
+    over_seeds,
+    records,
+    run_table,
+    setting,
+)
+
+#: Columns of the papers' tables, in their order.
+COLUMNS = (
+    "position_l1",
+    "speed_l1",
+    "acceleration_l1",
+    "pck",
+    "stft",
+    "ssim",
+    "lpips",
+    "fgd",
+    "diversity",
+    "multimodality",
+)
+_ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
+
+
+def make(
+    table: str, title: str, variants: Mapping[str, Variant], claims: Sequence[Claim], paper: Mapping[str, str]
+) -> None:
+    """The command of a table: train and score what is missing, and draw it; without a corpus, only draw it."""
+    options = arguments(title).parse_args()
+    if options.corpus is not None:
+        where = setting(options)
+        baselines(table, where)
+        run_table(table, variants, where, options.only.split(",") if options.only else None)
+    text = render(table, title, list(variants), claims, paper)
+    (RESULTS / f"{table}.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
+def render(
+    table: str,
+    title: str,
+    rows: Sequence[str],
+    claims: Sequence[Claim],
+    paper: Mapping[str, str],
+    extra: Sequence[str] = ("beat_alignment",),
+) -> str:
+    """Markdown with our table, what the paper reports and whether its claims hold here."""
+    columns = [*COLUMNS, *extra]
+    found = records(table)
+    names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
+    head = " | ".join(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in columns)
+    lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]
+    for name in names:
+        cells = [_cell(table, name, metric) for metric in columns]
+        seeds = len({record["seed"] for record in found if record["variant"] == name})
+        if seeds:
+            lines.append(f"| {name} | {seeds} | {' | '.join(cells)} |")
+    lines += ["", "Means over seeds +- half of a 95 % interval; in brackets the best of the samples.", ""]
+    if claims:
+        lines += ["What the paper says, checked on our data (differences paired by seed):", ""]
+        lines += [f"- {claim.text}: **{judge(table, claim)}**" for claim in claims]
+        lines.append("")
+    if paper:
+        lines += [
+            "The paper's figures, on **other data** (Trinity or S2G-Ellen), another skeleton and another feature"
+            " network; they cannot be compared with ours in value, only in order:",
+            "",
+            *(f"- {name}: {text}" for name, text in paper.items()),
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _unit(name: str) -> str:
+    return f", {METRICS[name].unit}" if METRICS[name].unit else ""
+
+
+def _cell(table: str, variant: str, metric: str) -> str:
+    found = over_seeds(table, variant, metric)
+    if found is None:
+        return "-"
+    digits = METRICS[metric].digits
+    mean, half, count = found
+    text = f"{mean:.{digits}f}" + (f" +- {half:.{digits}f}" if count > 1 else "")
+    best = best_over_seeds(table, variant, metric)
+    return text if best is None or best == mean else f"{text} ({best:.{digits}f})"
+
+
+def _budget(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    trained = [record for record in found if record["steps"] > 0]
+    if not trained:
+        return ["Nothing was trained yet."]
+    steps = sorted({record["steps"] for record in trained})
+    minutes = sum(record["train_seconds"] for record in trained) / 60
+    corpora = sorted({record["corpus"] for record in found})
+    return [
+        f"Generated corpus {', '.join(corpora)}; the tiny preset, {', '.join(map(str, steps))} steps of 8 clips a run,"
+        f" {len(trained)} records, {minutes:.0f} minutes of training on 2 cores beside other work;"
+        f" {trained[0]['samples']} samples of {trained[0]['clips']} test clips.",
+    ]
