@@ -170,7 +170,7 @@ def make_parser() -> argparse.ArgumentParser:
     train.add_argument("--out", metavar="RUN", help="folder of the run")
     train.add_argument("--preset", default="tiny", help="tiny: minutes on 2 cores; paper: as published (default: tiny)")
     train.add_argument(
-        "--features", metavar="RUN", help="a run of motion_autoencoder, for models with a perceptual loss"
+        "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"
     )
     train.add_argument("--resume", action="store_true", help="go on from the latest checkpoint")
     train.add_argument("--settings", action="store_true", help="list every setting with its value, and do nothing")

@@ -11,10 +11,18 @@ DESCRIPTION = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g evaluate``."""
     parser.add_argument("runs", nargs="*", metavar="RUN", help="run folders, or 'demo'; none: baselines alone")
-    parser.add_argument("--corpus", required=True, metavar="CORPUS", help="made by 'a2g prepare'")
+    parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and .png")
     parser.add_argument(
-        "--features", metavar="RUN", help="a run of motion_autoencoder, for FGD and LPIPS (default: these are left out)"
+        "--features",
+        metavar="RUN",
+        help="a run of motion_autoencoder, or 'demo' for the one that comes along; for FGD and LPIPS (default: none)",
+    )
+    parser.add_argument(
+        "--emotion-classifier", metavar="RUN", help="a run of emotion_classifier --input motion, for emotion accuracy"
+    )
+    parser.add_argument(
+        "--compare", nargs="+", metavar="REPORT", help="instead of scoring: folders of reports, as one table"
     )
     parser.add_argument(
         "--audit",

@@ -1,6 +1,6 @@
 """What is scored beside a model: the truth, other right motions, and motions that are nobody's answer to the audio.
 
-Every candidate is poses of one test stretch, 6D rotations (T, J, 6), as many frames as the stretch has.
+Every candidate is poses of one test stretch, as the corpus writes them down, as many frames as the stretch has.
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ from a2g_jax.data.talker.recordings import resample_motion, talk
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
 
-Pose = Float[np.ndarray, "T J 6"]
+Pose = Float[np.ndarray, "T R D"]
 
 #: Seconds of audio that are looked up at once in the training split.
 NEIGHBOUR_SECONDS = 4.0
@@ -28,8 +28,15 @@ _CHUNK = 1500
 
 
 def mean_pose(corpus: Corpus, segment: Segment) -> Pose:
-    """The training split's mean rotations, standing still."""
-    return np.tile(corpus.statistics["pose"].mean[None], (segment.frames, 1, 1)).astype(np.float32)
+    """The training split's mean pose, standing still."""
+    return np.tile(_mean(corpus)[None], (segment.frames, 1, 1)).astype(np.float32)
+
+
+def _mean(corpus: Corpus) -> Float[np.ndarray, "R D"]:
+    mean = np.asarray(corpus.statistics["pose"].mean)
+    if corpus.representation == "directions":
+        return mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
+    return mean
 
 
 def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:

@@ -10,16 +10,22 @@ import numpy as np
 
 from a2g_jax import __version__
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.poses import PoseLayout
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import candidates
 from a2g_jax.evaluation.audit import Heard, listening_audit
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Pose, Scorer, Target
+from a2g_jax.evaluation.labelled import EmotionJudge, relevance
+from a2g_jax.evaluation.places import Body, Pose
+from a2g_jax.evaluation.report import BASELINES
+from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
 from a2g_jax.generation.generate import Generator
+from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
 from a2g_jax.metrics.distribution import frechet_distance, split_floor
 from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.labels import calinski_harabasz, silhouette
 from a2g_jax.training.run import Run
 
 #: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
@@ -29,17 +35,6 @@ MOST_FRAMES = 5000
 _LEAST_FRAMES, _FEW = 100, 5
 #: How much is generated again and again to see whether a model listens.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
-
-#: What is scored beside the models, in the order of the table.
-BASELINES = (
-    "truth",
-    "another right motion",
-    "truth, 1 degree of noise",
-    "truth, 5 degrees of noise",
-    "nearest neighbour in audio",
-    "another clip's motion",
-    "mean pose",
-)
 
 
 @dataclass(frozen=True)
@@ -59,16 +54,26 @@ def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
     Raises:
         InputError: another skeleton, frame rate or audio feature.
     """
-    corpus.require_pose("6d")
     for name, run in runs.items():
         config = run.config
-        if not config.skeleton.same_tree(corpus.skeleton):
+        if config.representation != corpus.representation:
+            raise InputError(
+                f"{name}: makes {config.representation}, but {corpus.path} holds {corpus.representation}; prepare that"
+                f" with --pose {config.representation}."
+            )
+        if not _same_body(config.body, corpus.body):
             raise InputError(f"{name}: moves another skeleton than {corpus.path} has; train one on such a corpus.")
         if config.fps != corpus.fps or config.mel != corpus.mel:
             raise InputError(
                 f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, otherwise made than the"
                 f" {corpus.mel.width} at {corpus.fps:g} fps of {corpus.path}; prepare that with its features."
             )
+
+
+def _same_body(first: Skeleton | PoseLayout, second: Skeleton | PoseLayout) -> bool:
+    if isinstance(first, Skeleton) and isinstance(second, Skeleton):
+        return first.same_tree(second)
+    return isinstance(first, PoseLayout) and isinstance(second, PoseLayout) and first.names == second.names
 
 
 def evaluate(
@@ -79,6 +84,7 @@ def evaluate(
     samples: int = 20,
     seed: int = 0,
     network: FeatureNetwork | None = None,
+    judge: EmotionJudge | None = None,
     audit: bool = False,
     baselines: bool = True,
     report: Callable[[int, int], None] = lambda done, total: None,
@@ -87,7 +93,8 @@ def evaluate(
 
     Args:
         samples: motions that each run makes for each clip.
-        network: without one, FGD and LPIPS are left out.
+        network: without one, FGD, LPIPS and what is told of groups are left out.
+        judge: without one, emotion accuracy is left out.
         baselines: whether the rows beside the runs are scored too.
         audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
         report: called with how many (candidate, clip) pairs are done, of how many.
@@ -104,9 +111,10 @@ def evaluate(
         segments = [piece for segment in segments for piece in _pieces(segment, least)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
-    scorer = Scorer(corpus.skeleton, corpus.fps, network)
+    scorer = Scorer(Body(corpus.body, corpus.representation), corpus.fps, network, judge)
     targets = [_target(corpus, scorer, segment) for segment in segments]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
+    speakers = [corpus.recordings[segment.recording].speaker for segment in segments]
     total, done, rows = (len(runs) + baselines * len(BASELINES)) * len(segments), 0, []
     for name, draw in _candidates(runs, corpus, segments, samples, seed):
         if not baselines and name in BASELINES and name not in runs:
@@ -124,7 +132,7 @@ def evaluate(
             spread.append(scorer.multimodality(poses))
             features.append([scorer.features(pose) for pose in poses])
         if per_clip:
-            rows.append(Row(name, count, _summary(per_clip, spread, features, reference, seed)))
+            rows.append(Row(name, count, _summary(per_clip, spread, features, reference, speakers, seed)))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -137,6 +145,8 @@ def evaluate(
         "seed": seed,
         "skeleton": _fingerprint(corpus),
         "feature_network": None if network is None else network.fingerprint,
+        "emotion_classifier": None if judge is None else judge.fingerprint,
+        "unit": scorer.body.unit,
         "feature_vectors": len(reference),
         "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
     }
@@ -155,8 +165,8 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
     speakers = [corpus.recordings[segment.recording].speaker for segment in chosen]
 
     def listen(heard: Heard, number: int) -> np.ndarray:
-        motion = next(generator.stream_features(np.asarray(heard.features, np.float32), 1, (seed + number) % 2**31))
-        return scorer.wrists(scorer.positions(_rows(np.asarray(motion.rotations))))
+        rows = next(generator.rows(np.asarray(heard.features, np.float32), 1, (seed + number) % 2**31))
+        return scorer.body.wrists(scorer.body.places(rows))
 
     return listening_audit(listen, clips, speakers, corpus.fps)
 
@@ -175,7 +185,8 @@ def _cut(segment: Segment) -> Segment:
 def _target(corpus: Corpus, scorer: Scorer, segment: Segment) -> Target:
     pose = np.asarray(corpus.pose[segment.start : segment.stop])
     onsets = mel_onsets(np.asarray(corpus.audio[segment.start : segment.stop]), corpus.fps)
-    return Target(pose, scorer.positions(pose), onsets)
+    emotion = corpus.recordings[segment.recording].emotion
+    return Target(pose, scorer.body.places(pose), onsets, emotion, relevance(corpus, segment))
 
 
 _Draw = Callable[[int], list[Pose] | None]
@@ -192,19 +203,19 @@ def _candidates(
             segment = segments[number]
             audio = np.asarray(corpus.audio[segment.start : segment.stop])
             # A seed of its own for every clip, so that clips are independent draws.
-            motions = generator.stream_features(audio, samples, (seed + 7919 * (number + 1)) % 2**31)
-            return [_rows(np.asarray(motion.rotations)) for motion in motions]
+            return list(generator.rows(audio, samples, (seed + 7919 * (number + 1)) % 2**31))
 
         yield name, model
     truth = lambda number: np.asarray(corpus.pose[segments[number].start : segments[number].stop])  # noqa: E731
-    noise = lambda number, degrees: candidates.with_noise(  # noqa: E731
-        truth(number), degrees, np.random.default_rng([seed, number])
+    rotates = corpus.representation == "6d"
+    noise = lambda number, degrees: (  # noqa: E731
+        [candidates.with_noise(truth(number), degrees, np.random.default_rng([seed, number]))] if rotates else None
     )
     baselines: tuple[_Draw, ...] = (
         lambda number: [truth(number)],
         lambda number: candidates.right_motions(corpus, segments[number], samples, seed),
-        lambda number: [noise(number, 1.0)],
-        lambda number: [noise(number, 5.0)],
+        lambda number: noise(number, 1.0),
+        lambda number: noise(number, 5.0),
         lambda number: [candidates.nearest_neighbour(corpus, segments[number])],
         lambda number: [candidates.other_clip(corpus, segments, number)],
         lambda number: [candidates.mean_pose(corpus, segments[number])],
@@ -212,15 +223,12 @@ def _candidates(
     yield from zip(BASELINES, baselines, strict=True)
 
 
-def _rows(rotations: np.ndarray) -> Pose:
-    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6)
-
-
 def _summary(
     per_clip: list[list[dict[str, float]]],
     spread: list[float],
     features: list[list[np.ndarray]],
     reference: np.ndarray,
+    speakers: list[str],
     seed: int,
 ) -> dict[str, dict[str, Any]]:
     """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips."""
@@ -247,11 +255,34 @@ def _summary(
         # One set of features for each sample number, over all clips, so that n is that of the truth.
         sets = [np.concatenate([clip[sample] for clip in features]) for sample in range(len(features[0]))]
         distances = [frechet_distance(vectors, reference).value for vectors in sets]
+        summary |= _groups(features, speakers)
         summary["fgd"] = {"mean": float(np.mean(distances)), "low": None, "high": None, "best": float(min(distances))}
     return summary
 
 
+def _groups(features: list[list[np.ndarray]], speakers: list[str]) -> dict[str, dict[str, Any]]:
+    """How well the speakers are grouped in the space of the features, for each sample number and on average."""
+    found: dict[str, list[float]] = {"chi": [], "silhouette": []}
+    numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
+    for sample in range(len(features[0])):
+        vectors = np.concatenate([clip[sample] for clip in features])
+        labels = np.concatenate(
+            [np.full(len(clip[sample]), numbers[name]) for clip, name in zip(features, speakers, strict=True)]
+        )
+        if not 2 <= len(np.unique(labels)) < len(labels):
+            return {}
+        found["chi"].append(calinski_harabasz(vectors, labels))
+        found["silhouette"].append(silhouette(vectors, labels))
+    return {
+        name: {"mean": float(np.mean(values)), "low": None, "high": None, "best": None}
+        for name, values in found.items()
+    }
+
+
 def _fingerprint(corpus: Corpus) -> str:
-    skeleton = corpus.skeleton
-    value = [list(skeleton.names), list(skeleton.parents), np.round(np.asarray(skeleton.offsets), 4).tolist()]
+    body = corpus.body
+    if isinstance(body, Skeleton):
+        value = [list(body.names), list(body.parents), np.round(np.asarray(body.offsets), 4).tolist()]
+    else:
+        value = [corpus.representation, list(body.names), [list(bone) for bone in body.bones]]
     return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]

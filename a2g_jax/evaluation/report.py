@@ -5,10 +5,20 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.scores import METRICS
-from a2g_jax.io.files import atomic_path, make_folder
+from a2g_jax.evaluation.scores import AGAINST_TRUTH, METRICS
+from a2g_jax.io.files import atomic_path, make_folder, read_json
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
+#: What is scored beside the models, in the order of the table.
+BASELINES = (
+    "truth",
+    "another right motion",
+    "truth, 1 degree of noise",
+    "truth, 5 degrees of noise",
+    "nearest neighbour in audio",
+    "another clip's motion",
+    "mean pose",
+)
 _LATEX_ARROWS = {"lower": r"$\downarrow$", "higher": r"$\uparrow$", "truth": r"$\approx$"}
 
 
@@ -36,13 +46,19 @@ def write_report(result: dict[str, Any], out: Path) -> list[Path]:
 def markdown(result: dict[str, Any]) -> str:
     """The table with what it is of and how it is read."""
     about, names = result["about"], _metrics(result)
-    head = [f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in names]
-    lines = ["| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(names) + 2)]
-    for row in result["rows"]:
-        cells = [_cell(row["scores"].get(name), name) for name in names]
-        lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
+    lines = []
+    for title, part in (
+        ("Against the recorded motion", [name for name in names if name in AGAINST_TRUTH]),
+        ("Distribution, variety, rhythm and smoothness", [name for name in names if name not in AGAINST_TRUTH]),
+    ):
+        head = [f"{METRICS[name].title}{_unit(name, about)} {_ARROWS[METRICS[name].better]}" for name in part]
+        lines += [f"**{title}**", "", "| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(part) + 2)]
+        for row in result["rows"]:
+            cells = [_cell(row["scores"].get(name), name) for name in part]
+            lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
+        lines.append("")
     audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
-    return "\n".join([*_preface(about), "", *lines, "", *_notes(about), "", *audits])
+    return "\n".join([*_preface(about), "", *lines, *_notes(about), "", *audits])
 
 
 def latex(result: dict[str, Any]) -> str:
@@ -75,13 +91,59 @@ def check_comparable(results: dict[str, dict[str, Any]]) -> None:
     """
     (first, reference), *others = results.items()
     for name, result in others:
-        for key in ("skeleton", "corpus", "split", "samples", "feature_network"):
+        for key in ("skeleton", "corpus", "split", "samples", "clips", "feature_network", "emotion_classifier"):
             here, there = reference["about"].get(key), result["about"].get(key)
             if here != there:
                 raise InputError(
                     f"{first} and {name}: cannot be compared: {key.replace('_', ' ')} is {here} in one and {there} in"
                     " the other; evaluate both in the same way."
                 )
+
+
+def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Reports of the same thing as one: every model of each, and the baselines once.
+
+    Args:
+        results: contents of ``report.json`` files by their names.
+
+    Raises:
+        InputError: see :func:`check_comparable`.
+    """
+    check_comparable(results)
+    names: list[str] = [row["name"] for result in results.values() for row in result["rows"]]
+    rows: list[dict[str, Any]] = []
+    baselines: dict[str, dict[str, Any]] = {}
+    audits: dict[str, Any] = {}
+    for report, result in results.items():
+        for row in result["rows"]:
+            if row["name"] in BASELINES:
+                baselines.setdefault(row["name"], row)
+                continue
+            name = f"{row['name']} ({report})" if names.count(row["name"]) > 1 else row["name"]
+            rows.append({**row, "name": name})
+            if row["name"] in result.get("audits", {}):
+                audits[name] = result["audits"][row["name"]]
+    about = next(iter(results.values()))["about"]
+    return {"about": about, "rows": [*rows, *baselines.values()], "audits": audits}
+
+
+def read_report(folder: Path) -> dict[str, Any]:
+    """The contents of a report's ``report.json``.
+
+    Raises:
+        InputError: there is none, or it is not a report's.
+    """
+    path = folder / "report.json"
+    if not path.is_file():
+        raise InputError(f"{folder}: is no report (no report.json in it); make one with 'a2g evaluate RUN ...'.")
+    value = read_json(path)
+    if (
+        not isinstance(value, dict)
+        or not isinstance(value.get("about"), dict)
+        or not isinstance(value.get("rows"), list)
+    ):
+        raise InputError(f"{path}: is not a report of 'a2g evaluate'; make it anew.")
+    return value
 
 
 def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
@@ -106,8 +168,12 @@ def _metrics(result: dict[str, Any]) -> list[str]:
     return [name for name in METRICS if name in there]
 
 
-def _unit(name: str) -> str:
-    return f", {METRICS[name].unit}" if METRICS[name].unit else ""
+def _unit(name: str, about: dict[str, Any]) -> str:
+    """Lengths are centimetres and metres, or the corpus's own unit where it has no metres."""
+    unit = METRICS[name].unit
+    if unit and about.get("unit", "cm") != "cm":
+        unit = unit.replace("cm", about["unit"]).replace("m/", f"{about['unit']}/")
+    return f", {unit}" if unit else ""
 
 
 def _cell(score: dict[str, Any] | None, name: str) -> str:
@@ -169,7 +235,7 @@ def _picture(result: dict[str, Any], path: Path) -> None:
     figure, axes = pyplot.subplots(
         lines, columns, figsize=(13, lines * height), sharey=True, squeeze=False, layout="constrained"
     )
-    models = len(rows) - sum(row["samples"] <= 1 or "right" in row["name"] for row in rows)
+    models = sum(row["name"] not in BASELINES for row in rows)
     for panel, name in zip(axes.flat, names, strict=False):
         for place, row in enumerate(rows):
             score = row["scores"].get(name)
@@ -182,7 +248,9 @@ def _picture(result: dict[str, Any], path: Path) -> None:
         values = sorted(row["scores"][name]["mean"] for row in rows if name in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
             panel.set_xlim(0, 1.6 * values[-2])  # one row beyond all others would flatten them
-        panel.set_title(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}", fontsize=9)
+        panel.set_title(
+            f"{METRICS[name].title}{_unit(name, result['about'])} {_ARROWS[METRICS[name].better]}", fontsize=9
+        )
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
     for panel in list(axes.flat)[len(names) :]:

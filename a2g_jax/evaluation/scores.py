@@ -1,7 +1,6 @@
 """Scores of one motion for one stretch of a corpus, and of several for the same audio."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -9,13 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.geometry.body import find_body
-from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d
-from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
-from a2g_jax.metrics import beats, distribution, diversity, physical, pointwise, structural
-
-Pose = Float[np.ndarray, "T J 6"]
+from a2g_jax.evaluation.labelled import EmotionJudge
+from a2g_jax.evaluation.places import Body, Points, Pose
+from a2g_jax.metrics import beats, distribution, diversity, physical, pointwise, semantic, structural
 
 
 class Metric(NamedTuple):
@@ -32,9 +27,11 @@ class Metric(NamedTuple):
 _A2G = "Audio2Gestures, extended"
 METRICS: dict[str, Metric] = {
     "position_l1": Metric("position L1", "cm", "lower", f"{_A2G}, Eq. 22", 2),
+    "position_l1_star": Metric("position L1*", "cm", "lower", f"{_A2G}, Eq. 23", 2),
+    "position_l2": Metric("position L2", "cm", "lower", "EmotionGesture", 2),
     "speed_l1": Metric("speed L1", "cm/s", "lower", f"{_A2G}, Sec. 5.2.1", 1),
     "acceleration_l1": Metric("acceleration L1", "m/s2", "lower", f"{_A2G}, Sec. 5.2.1", 2),
-    "pck": Metric("PCK at 20 cm", "", "higher", f"{_A2G}, Eq. 24"),
+    "pck": Metric("PCK", "", "higher", f"{_A2G}, Eq. 24"),
     "mpjre": Metric("joint rotation error", "degrees", "lower", "EmotionGesture", 1),
     "stft": Metric("STFT", "", "lower", f"{_A2G}, Eq. 6"),
     "ssim": Metric("SSIM", "", "higher", f"{_A2G}, Eq. 7"),
@@ -44,62 +41,72 @@ METRICS: dict[str, Metric] = {
     "multimodality": Metric("multimodality", "cm", "truth", f"{_A2G}, Eq. 27", 2),
     "beat_alignment": Metric("beat alignment, motion to audio, 5 frames", "", "truth", "stylized flow"),
     "beat_alignment_audio": Metric("beat alignment, audio to motion, 0.1 s", "", "truth", "BEAT"),
+    "srgr": Metric("SRGR", "", "higher", "BEAT, bounded form"),
+    "emotion_accuracy": Metric("emotion accuracy", "", "higher", "EmotionGesture"),
+    "l1_div": Metric("L1div", "cm", "truth", "BEAT", 0),
+    "chi": Metric("CHI of speakers", "", "truth", "stylized flow, Table 3", 1),
+    "silhouette": Metric("silhouette of speakers", "", "truth", "stylized flow, Table 3"),
     "speed_hellinger": Metric("wrist speeds, Hellinger", "", "lower", "GENEA"),
     "jerk": Metric("wrist jerk, 90th percentile", "m/s3", "truth", "GENEA", 0),
 }
+#: Metrics that compare with the truth frame by frame or window by window; a report's first table.
+AGAINST_TRUTH = (
+    *("position_l1", "position_l1_star", "position_l2", "speed_l1", "acceleration_l1", "pck", "mpjre", "stft", "ssim"),
+    *("lpips", "srgr"),
+)
 #: Metrics that are a number for each motion; the others are one for a clip, or one for all.
-PER_SAMPLE = tuple(name for name in METRICS if name not in ("fgd", "multimodality"))
-
-_THRESHOLD = 0.2
+PER_SAMPLE = tuple(name for name in METRICS if name not in ("fgd", "multimodality", "chi", "silhouette"))
 
 
 @dataclass(frozen=True, eq=False)
 class Scorer:
     """Everything that scoring needs besides motions."""
 
-    skeleton: Skeleton
+    body: Body
     fps: float
     network: FeatureNetwork | None
-
-    def positions(self, pose: Pose) -> Float[np.ndarray, "T J 3"]:
-        """Joints in metres, the root at the origin."""
-        return np.asarray(_positions(pose, np.asarray(self.skeleton.offsets, np.float32), self.skeleton.parents))
+    judge: EmotionJudge | None = None
 
     def sample(self, pose: Pose, target: "Target") -> dict[str, float]:
         """Scores of one motion."""
-        places, fps = self.positions(pose), self.fps
-        scores: dict[str, Any] = dict(_against(places, target.places, pose, target.pose, fps))
-        scores["diversity"] = 100 * _clip_distance(places)
+        body, fps = self.body, self.fps
+        places = body.places(pose)
+        scores: dict[str, Any] = dict(_against(places, target.places, body.near(target.places), fps, body.scale))
+        rotations, theirs = body.rotations(pose), body.rotations(target.pose)
+        if rotations is not None and theirs is not None:
+            scores["mpjre"] = _rotation_error(rotations, theirs)
+        reach = body.reach()
+        if reach is not None:
+            scores["position_l1_star"] = scores["position_l1"] * pointwise.REFERENCE_WRIST_TO_WRIST / reach
+        if target.relevance is not None:
+            scores["srgr"] = semantic.srgr(places, target.places, target.relevance, body.near(target.places) / 2)
+        if self.judge is not None:
+            scores["emotion_accuracy"] = self.judge.accuracy(pose, target.emotion)
+        scores["diversity"] = body.scale * _clip_distance(places)
+        scores["l1_div"] = body.scale * diversity.l1_div(places, None)
         moves = beats.motion_beats(places, fps, smoothing=2.0 / fps)
         # Authors count five frames at fifteen a second.
         scores["beat_alignment"] = beats.beat_alignment(moves, target.onsets, beats.FLOW_SIGMA_FRAMES / fps)
         scores["beat_alignment_audio"] = beats.beat_alignment(target.onsets, moves, beats.BEAT_SIGMA)
-        wrists = self.wrists(places)
+        wrists = body.wrists(places)
         scores["jerk"] = float(np.percentile(np.asarray(physical.jerk(wrists, fps)), 90))
-        theirs = np.asarray(physical.speeds(self.wrists(target.places), fps)).ravel()
-        scores["speed_hellinger"] = distribution.speed_hellinger(
-            np.asarray(physical.speeds(wrists, fps)).ravel(), theirs
-        )
+        speeds = np.asarray(physical.speeds(body.wrists(target.places), fps)).ravel()
+        ours = np.asarray(physical.speeds(wrists, fps)).ravel()
+        if body.metres:
+            scores["speed_hellinger"] = distribution.speed_hellinger(ours, speeds)
         if self.network is not None:
             scores["lpips"] = self._lpips(pose, target.pose)
         return {name: float(value) for name, value in scores.items()}
 
     def multimodality(self, poses: list[Pose]) -> float:
-        """Mean distance of several motions for one audio from each other, cm."""
+        """Mean distance of several motions for one audio from each other."""
         if len(poses) < 2:
             return float("nan")
-        return 100 * diversity.mean_pair_distance(np.stack([self.positions(pose) for pose in poses]))
+        return self.body.scale * diversity.mean_pair_distance(np.stack([self.body.places(pose) for pose in poses]))
 
     def features(self, pose: Pose) -> Float[np.ndarray, "n F"]:
         """Vectors for the Fréchet distance; none without a network."""
         return np.zeros((0, 1), np.float32) if self.network is None else self.network.clip_features(pose)
-
-    def wrists(self, places: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T w 3"]:
-        """Both wrists, or every joint of a rig without."""
-        body = find_body(self.skeleton)
-        if body is None:
-            return places
-        return places[:, [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]]
 
     def _lpips(self, pose: Pose, target: Pose) -> float:
         """Between time-averaged features of clips (Sec. 5.2.1), summed over blocks, averaged over clips."""
@@ -118,34 +125,35 @@ class Scorer:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """The truth of a stretch, and the onsets of its speech in seconds."""
+    """The truth of a stretch, the onsets of its speech in seconds, and what is known of it."""
 
     pose: Pose
-    places: Float[np.ndarray, "T J 3"]
+    places: Points
     onsets: Float[np.ndarray, " n"]
+    emotion: str = ""
+    relevance: Float[np.ndarray, " T"] | None = None
+    """Of each frame, how much its gesture means."""
 
 
-def _clip_distance(places: Float[np.ndarray, "T J 3"]) -> float:
+def _clip_distance(places: Points) -> float:
     """Mean distance of a motion's clips from each other; NaN for a motion of one clip."""
     clips = diversity.clips_of(places)
     return diversity.mean_pair_distance(clips) if len(clips) > 1 else float("nan")
 
 
-@partial(jax.jit, static_argnums=2)
-def _positions(pose, offsets, parents):
-    return joint_positions(matrix_from_6d(pose), offsets, parents)
+_rotation_error = jax.jit(pointwise.joint_rotation_error)
 
 
 @jax.jit
-def _against(places, target, pose, target_pose, fps):
-    """Everything that compares joint by joint, in one program."""
+def _against(places, target, near, fps, scale):
+    """Everything that compares point by point, in one program."""
     flat = lambda array: array.reshape(array.shape[0], -1)  # noqa: E731
     return {
-        "position_l1": 100 * pointwise.position_l1(places, target),
-        "speed_l1": 100 * fps * pointwise.speed_l1(places, target),
+        "position_l1": scale * pointwise.position_l1(places, target),
+        "position_l2": scale * pointwise.position_l2(places, target),
+        "speed_l1": scale * fps * pointwise.speed_l1(places, target),
         "acceleration_l1": fps**2 * pointwise.acceleration_l1(places, target),
-        "pck": pointwise.pck(places, target, _THRESHOLD),
-        "mpjre": pointwise.joint_rotation_error(matrix_from_6d(pose), matrix_from_6d(target_pose)),
+        "pck": pointwise.pck(places, target, near),
         "stft": structural.stft_distance(flat(places), flat(target)),
         "ssim": structural.ssim(flat(places), flat(target)),
     }

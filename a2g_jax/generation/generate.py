@@ -8,11 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.data.representation import rotations_from_rows
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.root import plant_feet
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
 from a2g_jax.nn.noise import BLOCK
 from a2g_jax.training.run import Run
 
@@ -41,12 +42,13 @@ class Generator:
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
-        self._mean_pose = np.asarray(matrix_from_6d(np.asarray(run.config.statistics["pose"].mean)))
+
+        representation = run.config.representation
 
         @jax.jit
         def sample(params, summary, key, condition, start):
             pose = draw(params, summary, key, condition, start)
-            return matrix_from_6d(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW))
+            return _valid(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW), representation)
 
         self._sample = sample
 
@@ -89,15 +91,30 @@ class Generator:
         yield from self.stream_features(log_mel(audio, config.mel, config.fps, frames), samples, seed)
 
     def stream_features(self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0) -> Iterator[Motion]:
-        """:meth:`stream` for log-mel features that are there already, one row a frame, not normalised."""
+        """:meth:`stream` for log-mel features that are there already, one row a frame, not normalised.
+
+        Raises:
+            InputError: the run makes keypoints or directions, which are no motion of a skeleton; see :meth:`rows`.
+        """
+        config = self.run.config
+        skeleton, mean = config.skeleton, np.asarray(config.statistics["pose"].mean)
+        mean_pose = rotations_from_rows(mean[None], config.representation)[0]
+        for rows in self.rows(features, samples, seed):
+            rotations = rotations_from_rows(rows, config.representation)
+            still = Motion(rotations, np.zeros((len(rotations), 3), np.float32), skeleton, config.fps)
+            yield plant_feet(still, np.asarray(config.statistics["root"].mean), mean_pose)
+
+    def rows(
+        self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0
+    ) -> Iterator[Float[np.ndarray, "T R D"]]:
+        """Different motions as the run's corpus writes poses down, for log-mel features, not normalised."""
         frames = len(features)
         windows = list(self._windows(features))
         key = jax.random.key(seed)
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
             parts = [draw(condition, jnp.int32(start)) for start, condition in windows]
-            rotations = np.concatenate([np.asarray(part) for part in parts])[:frames]
-            yield self._motion(rotations)
+            yield np.concatenate([np.asarray(part) for part in parts])[:frames]
 
     def _windows(self, features: Float[np.ndarray, "T bands"]):
         """First frame (context included) and encoded audio of each window."""
@@ -111,10 +128,11 @@ class Generator:
             window = normalised[start : start + WINDOW + 2 * self._halo]
             yield start - self._halo, self._condition(self._params, window)
 
-    def _motion(self, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
-        config = self.run.config
-        return plant_feet(
-            Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps),
-            np.asarray(config.statistics["root"].mean),
-            self._mean_pose,
-        )
+
+def _valid(pose, representation):
+    """The poses that a model's raw output stands for."""
+    if representation == "6d":
+        return matrix_to_6d(matrix_from_6d(pose))
+    if representation == "directions":
+        return pose / jnp.maximum(jnp.linalg.norm(pose, axis=-1, keepdims=True), 1e-6)
+    return pose

@@ -48,7 +48,7 @@ def acceleration_l1(predicted: Positions, target: Positions, fps: float = 1.0) -
     return fps**2 * position_l1(jnp.diff(predicted, n=2, axis=-3), jnp.diff(target, n=2, axis=-3))
 
 
-def pck(predicted: Positions, target: Positions, threshold: float) -> Float[Array, "*batch"]:
+def pck(predicted: Positions, target: Positions, threshold: float | Float[Array, ""]) -> Float[Array, "*batch"]:
     """Percentage of correct keypoints, as a share: joints nearer than ``threshold`` to their targets (Eq. 24).
 
     Args:

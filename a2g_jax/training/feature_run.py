@@ -33,12 +33,18 @@ class Perceptual:
 def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple["Run", str]:
     """A run of ``motion_autoencoder`` that looks at such poses as a corpus has, and the SHA-256 of its weights.
 
+    Args:
+        folder: of the run, or "demo" for the one that comes with the package.
+
     Raises:
         InputError: not a run, one of another model, or one for other joints, poses or frame rate.
     """
-    from a2g_jax.training.run import WEIGHTS_FILE, load_run
+    from a2g_jax.training.run import WEIGHTS_FILE, demo_feature_run, load_run
 
-    run = load_run(folder)
+    if folder == "demo":
+        run, fingerprint = demo_feature_run()
+    else:
+        run, fingerprint = load_run(folder), sha256_file(Path(folder) / WEIGHTS_FILE)
     config = run.config
     if config.model != FEATURE_MODEL:
         raise InputError(f"{folder}: is a run of {config.model}; a feature network is one of {FEATURE_MODEL}.")
@@ -49,7 +55,7 @@ def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple["R
             f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
             f" at {here[2]:g} fps; train one on such a corpus."
         )
-    return run, sha256_file(Path(folder) / WEIGHTS_FILE)
+    return run, fingerprint
 
 
 def load_perceptual(folder: str | os.PathLike[str], corpus: Corpus) -> Perceptual:

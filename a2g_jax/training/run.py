@@ -17,7 +17,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import atomic_path, read_json, write_json
+from a2g_jax.io.files import atomic_path, read_json, sha256_file, write_json
 from a2g_jax.models import find_model
 from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.training.config import TrainConfig
@@ -223,6 +223,12 @@ def demo_run() -> Run:
     """The trained run that comes with the package."""
     with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
         return load_run(folder)
+
+
+def demo_feature_run() -> tuple[Run, str]:
+    """The feature network that comes with the package, and the SHA-256 of its weights."""
+    with resources.as_file(resources.files("a2g_jax") / "demo_features") as folder:
+        return load_run(folder), sha256_file(folder / WEIGHTS_FILE)
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:

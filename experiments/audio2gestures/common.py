@@ -5,6 +5,7 @@ stopped goes on where it was, and a table can be drawn from what there is.
 """
 
 import argparse
+import hashlib
 import json
 import time
 from collections.abc import Mapping, Sequence
@@ -21,11 +22,9 @@ from a2g_jax.models import find_model
 from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import RunConfig, load_run
+from a2g_jax.training.run import RunConfig, load_run, run_to_json
 
 RESULTS = Path(__file__).parent / "results"
-#: What every run of the tables changes in the tiny preset, so that ramps end well before a short training does.
-SHORT: dict[str, Any] = {"kl_ramp_steps": 400, "alignment_ramp_steps": 400}
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only drawn")
     parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it")
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="folder for trained runs (default: runs)")
-    parser.add_argument("--steps", type=int, default=1200, help="training steps of each run (default: 1200)")
+    parser.add_argument("--steps", type=int, default=3000, help="training steps of each run (default: 3000)")
     parser.add_argument("--samples", type=int, default=20)
     parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: 0,1,2)")
     parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training begins")
@@ -106,12 +105,18 @@ def run_table(table: str, variants: Mapping[str, Variant], where: Setting, only:
             if (time.monotonic() - began) / 60 > where.minutes:
                 print(f"{table}: the budget of {where.minutes:g} minutes is used up; run it again to go on")
                 return
-            run, seconds = _trained(name, variant, variants, seed, corpus, where)
+            digest, described = _described(name, variant, variants, seed, corpus, where)
+            twin = _same(digest, conditions)
+            if twin is not None:
+                append(table, {**twin, "variant": name})
+                continue
+            run, seconds = _trained(described, variant, corpus, where)
             result = evaluate(
                 {name: run}, corpus, samples=where.samples, seed=seed, network=network, audit=True, baselines=False
             )
             record = {
                 **wanted,
+                "settings": digest,
                 "model": variant.model,
                 "changes": {**variant.changes, **(variant.generation or {})},
                 "train_seconds": seconds,
@@ -145,32 +150,51 @@ def baselines(table: str, where: Setting) -> None:
         append(table, {"variant": row["name"], "seed": 0, **wanted, "steps": 0, "scores": row["scores"]})
 
 
-def _trained(
+def _described(
     name: str, variant: Variant, variants: Mapping[str, Variant], seed: int, corpus: Corpus, where: Setting
-) -> tuple[Any, float]:
-    """The run of a variant, trained now if it was not before, and the seconds that its training took."""
-    source = variant.trained_as or name
-    folder = where.runs / f"{source.replace(' ', '_').replace('+', 'and')}_{seed}"
-    began = time.monotonic()
-    made = variants.get(source, variant)
+) -> tuple[str, RunConfig]:
+    """The run that a variant is made of, and a digest of everything that its scores depend on."""
+    made = variants.get(variant.trained_as or name, variant)
     preset = find_model(made.model).presets[made.preset]
-    short = {key: value for key, value in SHORT.items() if hasattr(preset, key)}
-    config = replace(preset, **{**short, **made.changes})
+    config = replace(preset, **made.changes)
     training = replace(
         TRAIN_PRESETS["tiny"],
         steps=where.steps,
-        warmup_steps=min(100, where.steps // 4),
+        warmup_steps=min(300, where.steps // 10),
         seed=seed,
         validate_every=400,
     )
     needs = getattr(config, "lpips_weight", 0.0) > 0
     perceptual = load_perceptual(where.features, corpus) if needs else None
     described = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
+    return _digest(described, variant.generation), described
+
+
+def _digest(described: RunConfig, generation: Mapping[str, Any] | None) -> str:
+    values = {**run_to_json(described, 0), "generation": dict(generation or {}), "package": None}
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def _same(digest: str, conditions: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The record of a variant of any table that is the same under another name."""
+    for path in sorted(RESULTS.glob("*.jsonl")):
+        for record in records(path.stem):
+            if record.get("settings") == digest and all(record[key] == value for key, value in conditions.items()):
+                return record
+    return None
+
+
+def _trained(described: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Any, float]:
+    """The run of a variant, trained now if it was not before, and the seconds that its training took."""
+    folder = where.runs / _digest(described, None)
+    began = time.monotonic()
     train(described, corpus, folder, resume=True, progress=False)
+    seconds = time.monotonic() - began
     run = load_run(folder)
     if variant.generation:
-        run = replace(run, config=replace(run.config, model_config=replace(config, **variant.generation)))
-    return run, time.monotonic() - began
+        settings = replace(run.config.model_config, **variant.generation)
+        run = replace(run, config=replace(run.config, model_config=settings))
+    return run, seconds
 
 
 def _line(record: Mapping[str, Any]) -> str:

@@ -27,7 +27,7 @@ CLAIMS = (
 )
 
 PAPER = {
-    "rho 0": "position L1 7.42 (7.26 or so) cm, PCK 0.83, LPIPS 44.2, FID 1.81, multimodality about 3.6",
+    "rho 0 (from the text)": "position L1 7.42 cm, PCK 0.83, LPIPS 44.2, FID 1.81, multimodality 3.59",
     "rho 0.1 cm": "position L1 7.61 (7.35), PCK 0.821, FID 2.25, diversity 6.20, multimodality 3.51",
     "rho 0.5 cm": "position L1 7.59 (7.43), PCK 0.826, FID 2.06, diversity 6.51, multimodality 3.33",
     "rho 2 cm": "position L1 7.86 (7.42), PCK 0.817, FID 2.16, diversity 6.23, multimodality 4.24",

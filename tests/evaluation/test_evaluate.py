@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
+from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.prepare import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
 from a2g_jax.data.talker.recordings import cast, talk
@@ -14,7 +15,10 @@ from a2g_jax.errors import InputError
 from a2g_jax.evaluation import candidates
 from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.evaluation.report import check_comparable, latex, markdown
+from a2g_jax.evaluation.labelled import load_emotion_judge, relevance
+from a2g_jax.evaluation.places import Body
+from a2g_jax.evaluation.report import check_comparable, latex, markdown, write_report
+from a2g_jax.evaluation.scores import Scorer, Target
 from a2g_jax.models import find_model
 from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.loop import train
@@ -162,3 +166,110 @@ def test_a_single_recording_is_scored_in_pieces_and_the_report_says_so(corpus):
     assert (pieces["about"]["clips"], pieces["about"]["stretches"]) == (3, 1)
     assert pieces["about"]["seconds"] == 12.0
     assert "pieces of 1 recording(s), which are not independent" in markdown(pieces)
+
+
+def test_reports_are_put_side_by_side(corpus, tmp_path, capsys):
+    """Two reports of the same thing become one; the baselines are there once, clashing names say their report."""
+    table = evaluate({}, corpus, samples=2)
+    mean = next(row for row in table["rows"] if row["name"] == "mean pose")
+    for name in ("first", "second"):
+        mine = {**mean, "name": "mine"}
+        write_report({**table, "rows": [mine, *table["rows"]], "audits": {}}, tmp_path / name)
+    out = tmp_path / "both"
+    command = ["evaluate", "--compare", str(tmp_path / "first"), str(tmp_path / "second"), "--out", str(out)]
+    assert main(command) == 0
+    names = [row["name"] for row in json.loads((out / "report.json").read_text())["rows"]]
+    assert names == [f"mine ({tmp_path / 'first'})", f"mine ({tmp_path / 'second'})", *BASELINES]
+    capsys.readouterr()
+    assert main([*command[:4], "--out", str(out), "--corpus", str(corpus.path)]) == 2
+    assert main(["evaluate", "--compare", str(tmp_path), "--out", str(out)]) == 2
+    assert "is no report" in capsys.readouterr().err
+    other = {**table, "about": {**table["about"], "clips": 99}}
+    write_report(other, tmp_path / "third")
+    assert main(["evaluate", "--compare", str(tmp_path / "first"), str(tmp_path / "third"), "--out", str(out)]) == 2
+    assert "clips is" in capsys.readouterr().err
+    assert main(["evaluate", "--out", str(out)]) == 2
+    assert "--corpus is needed" in capsys.readouterr().err
+
+
+def test_speakers_are_grouped_by_their_motion_but_not_by_the_mean_pose(result):
+    """Six speakers move differently; a pose that is the same for all tells none of them apart."""
+    assert score(result, "truth", "chi") > 1.0 > abs(score(result, "truth", "silhouette"))
+    rows = {row["name"]: row["scores"] for row in result["rows"]}
+    assert rows["mean pose"]["silhouette"]["mean"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_reach_of_the_skeleton_scales_the_starred_error(corpus, result):
+    row = next(row for row in result["rows"] if row["name"] == "mean pose")["scores"]
+    reach = Body(corpus.body).reach()
+    assert 1.0 < reach < 1.6
+    expected = row["position_l1"]["mean"] * 1.2064 / reach
+    assert row["position_l1_star"]["mean"] == pytest.approx(expected, rel=1e-6)
+    assert row["position_l2"]["mean"] < row["position_l1"]["mean"]
+
+
+def test_semantic_labels_are_weights_of_frames(corpus):
+    """SRGR counts the labelled frames alone."""
+    segment = corpus.segments("test")[0]
+    labels = [{"label": "deictic", "start": 1.0, "end": 2.0, "score": 0.5}]
+    told = dataclasses.replace(corpus)
+    object.__setattr__(told, "annotations", lambda recording: {"semantic": labels})
+    values = relevance(told, segment)
+    assert values.shape == (segment.frames,)
+    assert set(np.nonzero(values)[0]) == set(range(30, 60))
+    assert relevance(corpus, segment) is None
+    scorer = Scorer(Body(corpus.body), corpus.fps, None)
+    pose = np.asarray(corpus.pose[segment.start : segment.stop])
+    target = Target(pose, scorer.body.places(pose), np.arange(5.0), "neutral", values)
+    spoilt = pose.copy()
+    spoilt[100:] = pose[:1]
+    assert scorer.sample(spoilt, target)["srgr"] == 1.0
+    spoilt[30:60] = candidates.with_noise(pose[30:60], 60.0, np.random.default_rng(0))
+    assert scorer.sample(spoilt, target)["srgr"] < 0.9
+
+
+def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys):
+    small = dataclasses.replace(
+        find_model("emotion_classifier").presets["tiny"], channels=(16, 16), hidden=8, clip_frames=50, input="motion"
+    )
+    settings = dataclasses.replace(TRAIN_PRESETS["tiny"], steps=120, batch_size=8, warmup_steps=5, augmentation=0.0)
+    config = RunConfig.of("emotion_classifier", "tiny", small, settings, corpus)
+    train(config, corpus, tmp_path / "judge", resume=False, progress=False)
+    judge = load_emotion_judge(tmp_path / "judge", corpus)
+    table = evaluate({}, corpus, split="train", samples=2, judge=judge)
+    assert score(table, "truth", "emotion_accuracy") > 0.7
+    assert 0.0 < score(table, "mean pose", "emotion_accuracy") < 1.0
+    assert table["about"]["emotion_classifier"] == judge.fingerprint
+    listens = dataclasses.replace(small, input="audio")
+    config = RunConfig.of("emotion_classifier", "tiny", listens, dataclasses.replace(settings, steps=2), corpus)
+    train(config, corpus, tmp_path / "ear", resume=False, progress=False)
+    with pytest.raises(InputError, match="no classifier of emotions in motion"):
+        load_emotion_judge(tmp_path / "ear", corpus)
+
+
+@pytest.mark.parametrize("view", ["s2g", "ted"])
+def test_poses_without_a_skeleton_are_scored(view, tmp_path):
+    """Keypoints in their own unit, bones in metres; a model's samples too."""
+    out = tmp_path / "corpus"
+    assert main(["prepare", "talker", "--view", view, "--minutes", "8", "--seed", "3", "--out", str(out)]) == 0
+    flat = Corpus.open(out)
+    changes = {"audio_channels": (8,), "motion_channels": (8,), "decoder_channels": (8,), "clip_frames": 16}
+    config = RunConfig.of(
+        "audio2gestures",
+        "tiny",
+        dataclasses.replace(find_model("audio2gestures").presets["tiny"], **changes),
+        dataclasses.replace(TRAIN_PRESETS["tiny"], steps=5, batch_size=4),
+        flat,
+    )
+    run = train(config, flat, tmp_path / "run", resume=False, progress=False)
+    table = evaluate({"mine": run}, flat, samples=2)
+    unit = "units" if view == "s2g" else "cm"
+    assert table["about"]["unit"] == unit
+    assert f"position L1, {unit} ↓" in markdown(table)
+    assert score(table, "truth", "position_l1") == 0.0
+    assert score(table, "truth", "pck") == 1.0
+    assert score(table, "mine", "multimodality") > 0
+    assert 0.2 < score(table, "mean pose", "pck") <= 1.0
+    names = [row["name"] for row in table["rows"]]
+    assert "truth, 1 degree of noise" not in names
+    assert "nearest neighbour in audio" in names

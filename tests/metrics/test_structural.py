@@ -89,3 +89,16 @@ def test_gradients_are_finite_where_nothing_moves():
 def test_too_short_for_a_window():
     with pytest.raises(ValueError, match="expected 32 frames or more"):
         m.stft_distance(jnp.zeros((31, 2)), jnp.zeros((31, 2)))
+
+
+def test_ssim_is_scikit_images_with_one_window_over_all_frames(x64):
+    """Per coordinate a signal of odd length under a single flat window is the paper's global form (Eq. 7 to 13)."""
+    metrics = pytest.importorskip("skimage.metrics")
+    a, b = pair(7, frames=81)
+    expected = [
+        metrics.structural_similarity(
+            a[:, c], b[:, c], win_size=81, data_range=1.0, gaussian_weights=False, use_sample_covariance=True
+        )
+        for c in range(a.shape[1])
+    ]
+    np.testing.assert_allclose(float(m.ssim(jnp.asarray(a), jnp.asarray(b))), np.mean(expected), atol=1e-9)

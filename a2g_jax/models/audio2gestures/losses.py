@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from a2g_jax.geometry.rotation import geodesic_distance
 from a2g_jax.models.audio2gestures.networks import Gaussian
 
-Positions = Float[Array, "B T J 3"]
+Positions = Float[Array, "B T J _"]
 
 
 def _joint_mean(per_joint: Float[Array, "B T J"], weights: Float[Array, " J"] | None) -> Float[Array, ""]:
