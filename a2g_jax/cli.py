@@ -188,6 +188,24 @@ def make_parser() -> argparse.ArgumentParser:
     generate.add_argument("run", help="a run folder, or 'demo' for the weights that come along")
     generate.add_argument("--audio", required=True, metavar="FILE", help="speech, in any common format")
     generate.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
+    generate.add_argument(
+        "--keep-shared",
+        type=_number(int, 0, 10**6, "a whole number"),
+        metavar="N",
+        help="lowest DCT bands of S to keep",
+    )
+    generate.add_argument(
+        "--keep-specific",
+        type=_number(int, 0, 10**6, "a whole number"),
+        metavar="N",
+        help="lowest DCT bands of I to keep",
+    )
+    generate.add_argument(
+        "--edit",
+        action="append",
+        metavar="EDIT",
+        help="of DCT bands, such as 'specific scale 0:10 1.5'; may be repeated",
+    )
     sampling(generate)
     return parser
 

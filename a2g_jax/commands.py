@@ -280,9 +280,21 @@ def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g generate``."""
     check_formats(options.formats)
     _cache_compilations()
-    run = demo_run() if options.run == "demo" else load_run(options.run)
+    run = _edited(demo_run() if options.run == "demo" else load_run(options.run), options)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
     _generate(run, audio, options, Path(options.audio).name)
+
+
+def _edited(run: Run, options: argparse.Namespace) -> Run:
+    """The run with the edits of latent bands that the flags ask for."""
+    kept = (("shared", options.keep_shared), ("specific", options.keep_specific))
+    edits = [f"{name} keep {count}" for name, count in kept if count is not None] + (options.edit or [])
+    if not edits:
+        return run
+    if not hasattr(run.config.model_config, "edits"):
+        raise InputError(f"{options.run}: is a run of {run.config.model}, whose codes have no DCT bands to edit.")
+    settings = dataclasses.replace(run.config.model_config, edits=tuple(edits))
+    return dataclasses.replace(run, config=dataclasses.replace(run.config, model_config=settings))
 
 
 def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:

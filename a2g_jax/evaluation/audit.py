@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
+from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speed_peaks
 
 LogMel = Float[np.ndarray, "_ bands"]
@@ -80,7 +81,8 @@ def listening_audit(
 
     Returns:
         ``conditions``: for each, the mean change of the motion in cm and as a share of what another seed changes, and
-        the agreement of its wrist-speed peaks with the true audio's energy peaks; ``sampling_cm``; ``verdicts``.
+        the agreement of its wrist-speed peaks with the true audio's energy peaks, with its 95 % interval over clips;
+        ``sampling_cm``; ``verdicts``.
     """
     changes: dict[str, list[float]] = {}
     rhythm: dict[str, list[float]] = {}
@@ -103,13 +105,22 @@ def listening_audit(
             "change_cm": float(np.mean(changes[name])),
             "change_of_sampling": float(np.mean(changes[name])) / max(noise, 1e-9),
             "agreement": float(np.mean(rhythm[name])),
+            "agreement_interval": _interval(rhythm[name]),
         }
         for name in changes
     }
     return {"sampling_cm": noise, "clips": len(clips), "conditions": table, "verdicts": _verdicts(table, rhythm, noise)}
 
 
-def _verdicts(table: dict[str, dict[str, float]], rhythm: dict[str, list[float]], noise: float) -> list[str]:
+def _interval(values: list[float]) -> list[float] | None:
+    """95 % over clips, by bootstrap; None of a single one."""
+    if len(values) < 2:
+        return None
+    found = bootstrap_mean(np.array(values), np.random.default_rng(0))
+    return [found.low, found.high]
+
+
+def _verdicts(table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], noise: float) -> list[str]:
     """What stands out, worst first; ``"listens"`` where nothing does."""
     changed = {name: row["change_cm"] for name, row in table.items() if name != "true audio"}
     if max(changed.values()) < DEAF * noise:

@@ -3,7 +3,6 @@
 Every candidate is poses of one test stretch, as the corpus writes them down, as many frames as the stretch has.
 """
 
-import dataclasses
 from typing import Any
 
 import jax
@@ -12,8 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.rows import prepare_recording
-from a2g_jax.data.settings import Features
+from a2g_jax.data.representation import represent
 from a2g_jax.data.splits import Segment
 from a2g_jax.data.talker.recordings import resample_motion, talk
 from a2g_jax.errors import InputError
@@ -126,13 +124,12 @@ def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> 
     recording = talk(**role, fps=corpus.fps, sample_rate=corpus.mel.sample_rate, fingers=bool(options["fingers"]))
     entry = corpus.recordings[segment.recording]
     first = segment.start - entry.first
-    features = Features(corpus.fps, corpus.mel, corpus.representation, "all")
     key = jax.random.fold_in(jax.random.key(seed), segment.recording)
     poses = []
     for number in range(samples):
         motion, _ = resample_motion(recording, jax.random.fold_in(key, number))
-        rows = prepare_recording(dataclasses.replace(recording, motion=motion), features)
-        poses.append(rows.pose[first : first + segment.frames])
+        pose, _ = represent(motion, corpus.representation, entry.name)
+        poses.append(pose[first : first + segment.frames])
     return poses
 
 

@@ -32,7 +32,7 @@ from a2g_jax.training.run import Run
 MOST_FRAMES = 5000
 #: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer stretches than this are cut into pieces
 #: of that length, so that there is anything to draw intervals from.
-_LEAST_FRAMES, _FEW = 100, 5
+_LEAST_FRAMES, _FEW = 100, 3
 #: How much is generated again and again to see whether a model listens.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
 
@@ -148,6 +148,7 @@ def evaluate(
         "emotion_classifier": None if judge is None else judge.fingerprint,
         "unit": scorer.body.unit,
         "feature_vectors": len(reference),
+        "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
         "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
     }
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}

@@ -159,6 +159,8 @@ def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
     ]
     for condition, row in audit["conditions"].items():
         share, agreement = f"{row['change_of_sampling']:.2f}", f"{row['agreement']:.3f}"
+        if row.get("agreement_interval"):
+            agreement += f" [{row['agreement_interval'][0]:.3f}, {row['agreement_interval'][1]:.3f}]"
         lines.append(f"| {condition} | {row['change_cm']:.1f} | {share} | {agreement} |")
     return [*lines, ""]
 
@@ -217,6 +219,11 @@ def _notes(about: dict[str, Any]) -> list[str]:
         notes.append(
             f"FGD and LPIPS are by the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
             f" vectors a set;{floor} FGD falls with n."
+            + (
+                ""
+                if about.get("own_features", True)
+                else " The network was trained on another corpus: movement that was rare there weighs too much here."
+            )
         )
     return [f"- {note}" for note in notes]
 

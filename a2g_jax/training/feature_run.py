@@ -53,7 +53,7 @@ def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple["R
     if there != here:
         raise InputError(
             f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
-            f" at {here[2]:g} fps; train one on such a corpus."
+            f" at {here[2]:g} fps; train one on such a corpus, or prepare the corpus so (--fps, --pose, --joints)."
         )
     return run, fingerprint
 

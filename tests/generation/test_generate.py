@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from a2g_jax.cli import main
 from a2g_jax.data.talker.body import TALKER_SKELETON
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
@@ -16,6 +17,7 @@ from a2g_jax.generation.generate import Generator
 from a2g_jax.generation.root import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_euler
+from a2g_jax.io.audio import write_audio
 from a2g_jax.training.evaluation import collect_summary
 from a2g_jax.training.run import Run
 
@@ -120,3 +122,27 @@ def test_formats():
     for text in ("", "fbx", "bvh;npz"):
         with pytest.raises(InputError, match="--formats"):
             check_formats(text)
+
+
+def test_edits_of_bands_from_the_command_line(tmp_path, capsys):
+    """Flags change the motion as the setting does; what is no edit is refused before anything is written."""
+    write_audio(tmp_path / "speech.wav", talk(5.0, 3).audio, 16000)
+    command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "1", "--formats", "npz"]
+
+    def places(name, *flags):
+        assert main([*command, "--out", str(tmp_path / name), *flags]) == 0
+        return np.load(tmp_path / name / "sample_00.npz")["positions"]
+
+    plain, same = places("plain"), places("same", "--keep-shared", "128", "--edit", "specific scale 0:128 1")
+    np.testing.assert_allclose(same, plain, atol=1e-3)
+    still = places("still", "--keep-shared", "1", "--keep-specific", "1")
+    assert np.abs(np.diff(still, axis=0)).mean() < 0.5 * np.abs(np.diff(plain, axis=0)).mean()
+    capsys.readouterr()
+    for flags, message in (
+        (["--edit", "specific swap 0:4"], "which only Python can give"),
+        (["--keep-shared", "300"], "there are 128 bands"),
+        (["--edit", "louder"], "it begins with 'shared' or 'specific'"),
+    ):
+        assert main([*command, "--out", str(tmp_path / "none"), *flags]) == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()

@@ -1,0 +1,114 @@
+"""What the two codes of a trained Audio2Gestures carry: swapped between motions of the generated corpus.
+
+    python -m experiments.audio2gestures.codes --corpus CORPUS RUN [RUN ...]
+
+Clips of the test split in which one wrist clearly moves more are paired so that the two wrists differ. Of two clips A
+and B, ``g(S_A, I_B)`` is decoded: the wrist that moves more should be B's (the hidden choice is in I), and the moments
+at which a wrist is fast should be A's (the rhythm is in S). Chance is one half for the hand; for the times the same is
+measured against the strokes of a third clip. Writes ``results/codes.json``.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.evaluation.places import Body
+from a2g_jax.io.files import write_json
+from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.rhythm import agreement, speed_peaks
+from a2g_jax.models.audio2gestures.codec import Networks
+from a2g_jax.training.run import Run, demo_run, load_run
+from experiments.audio2gestures.common import RESULTS
+
+FRAMES = 128
+#: Share by which one wrist must move more than the other.
+CLEAR = 0.25
+#: Of the agreement of peaks, seconds.
+SIGMA = 0.1
+
+
+def clips_of(corpus: Corpus) -> np.ndarray:
+    """Clips of the test split one after another (N, 128, J, 6)."""
+    rows = [
+        start
+        for segment in corpus.segments("test")
+        for start in range(segment.start, segment.stop - FRAMES + 1, FRAMES)
+    ]
+    return np.stack([corpus.pose[row : row + FRAMES] for row in rows])
+
+
+def dominance(speeds: np.ndarray) -> float:
+    """From -1 (right wrist alone moves) to 1 (left); speeds are (T, 2), left first."""
+    left, right = speeds.mean(axis=0)
+    return float((left - right) / (left + right + 1e-9))
+
+
+def wrist_speeds(body: Body, pose: np.ndarray, fps: float) -> np.ndarray:
+    """Of both wrists, m/s, (T, 2), smoothed over 0.05 s."""
+    from scipy.ndimage import gaussian_filter1d
+
+    places = gaussian_filter1d(body.wrists(body.places(pose)), 0.05 * fps, axis=0)
+    return np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps
+
+
+def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
+    """Shares and agreements with their 95 % intervals over pairs."""
+    body, fps = Body(corpus.body, corpus.representation), corpus.fps
+    networks = Networks(run.config.model_config, run.config.data())
+    clips = clips_of(corpus)
+    speeds = [wrist_speeds(body, clip, fps) for clip in clips]
+    sides = np.array([dominance(one) for one in speeds])
+    clear = np.nonzero(np.abs(sides) > CLEAR)[0]
+    rng = np.random.default_rng(seed)
+    left, right = (rng.permutation(clear[sign * sides[clear] > 0]) for sign in (1, -1))
+    count = min(len(left), len(right))
+    pairs = [(a, b) for a, b in zip(left[:count], right[:count], strict=True)]
+    pairs += [(b, a) for a, b in pairs]
+
+    @jax.jit
+    def decode(pose_s, pose_i):
+        shared = networks.encode_motion(run.params, pose_s)[0].mean
+        specific = networks.encode_motion(run.params, pose_i)[1]
+        return networks.decode(run.params, networks.to_time(shared), networks.to_time(specific.mean))
+
+    made = np.asarray(decode(clips[[a for a, _ in pairs]], clips[[b for _, b in pairs]]))
+    peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
+    hand, own, donor, stranger = [], [], [], []
+    for (a, b), pose in zip(pairs, made, strict=True):
+        ours = wrist_speeds(body, pose, fps)
+        hand.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
+        found = speed_peaks(ours.max(axis=1), fps)
+        third = int(rng.integers(len(clips)))
+        for values, other in ((own, a), (donor, b), (stranger, third)):
+            values.append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
+    figures = {
+        "hand_follows_specific": hand,
+        "strokes_follow_shared": own,
+        "strokes_follow_specific": donor,
+        "strokes_of_a_stranger": stranger,
+    }
+    return {"pairs": len(pairs), **{name: bootstrap_mean(np.array(v), rng)._asdict() for name, v in figures.items()}}
+
+
+def main() -> None:
+    """Measure runs and write the figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="+", help="folders of runs, or 'demo'")
+    parser.add_argument("--corpus", type=Path, required=True)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    corpus = Corpus.open(options.corpus)
+    figures = {}
+    for name in options.runs:
+        run = demo_run() if name == "demo" else load_run(name)
+        figures[Path(name).name] = swap(run, corpus, options.seed)
+        print(Path(name).name, figures[Path(name).name])
+    write_json(RESULTS / "codes.json", {"corpus": corpus.fingerprint[:16], "seed": options.seed, "runs": figures})
+
+
+if __name__ == "__main__":
+    main()

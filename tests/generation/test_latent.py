@@ -1,0 +1,68 @@
+"""The latent space as notebooks use it, on the weights that come along."""
+
+import numpy as np
+import pytest
+
+from a2g_jax.data.talker.recordings import talk
+from a2g_jax.errors import InputError
+from a2g_jax.generation.generate import Generator
+from a2g_jax.generation.latent import LatentSpace
+from a2g_jax.training.run import demo_run
+
+
+@pytest.fixture(scope="module")
+def space():
+    return LatentSpace(demo_run())
+
+
+@pytest.fixture(scope="module")
+def speech():
+    return talk(6.0, 11)
+
+
+def test_codes_decode_to_what_generation_gives(space, speech):
+    generated = Generator(demo_run()).generate(speech.audio, 2, seed=5)[1]
+    motion = space.to_motion(space.from_audio(speech.audio, seed=5, sample=1))
+    assert motion.frames == generated.frames
+    np.testing.assert_allclose(motion.rotations, generated.rotations, atol=2e-4)
+
+
+def test_a_motion_comes_back(space, speech):
+    """Through the codes and back the wrists stay within a few centimetres; another motion is farther."""
+    motion = speech.motion
+    back = space.to_motion(space.from_motion(motion))
+    other = talk(6.0, 12).motion
+    local = lambda m: m.positions() - m.positions()[:, :1]  # noqa: E731
+    error = np.abs(local(back) - local(motion)).mean()
+    assert error < 0.5 * np.abs(local(other) - local(motion)).mean()
+
+
+def test_edits(space, speech):
+    codes = space.from_audio(speech.audio)
+    same = space.edit(codes, "specific keep 128")
+    np.testing.assert_allclose(same.specific, codes.specific, atol=1e-4)
+    still = space.edit(codes, "shared keep 1", "specific keep 1")
+    assert still.bands("shared")[1:].max() < 1e-3 < codes.bands("shared")[1:].max()
+    moving, calm = space.to_motion(codes), space.to_motion(still)
+    speed = lambda m: np.abs(np.diff(m.positions(), axis=0)).mean()  # noqa: E731
+    assert speed(calm) < 0.5 * speed(moving)
+
+
+def test_swapped_bands_are_the_others(space, speech):
+    first, second = space.from_audio(speech.audio, seed=1), space.from_audio(speech.audio, seed=2)
+    mixed = space.edit(first, "specific swap 0:10", other=second)
+    np.testing.assert_allclose(mixed.bands("specific")[:10], second.bands("specific")[:10], atol=1e-3)
+    np.testing.assert_allclose(mixed.bands("specific")[10:], first.bands("specific")[10:], atol=1e-3)
+    np.testing.assert_array_equal(space.swap(first, second).specific, second.specific)
+
+
+def test_refusals(space, speech):
+    codes = space.from_audio(speech.audio)
+    with pytest.raises(InputError, match="give one as 'other'"):
+        space.edit(codes, "shared swap 0:3")
+    with pytest.raises(InputError, match="less than a frame"):
+        space.from_audio(speech.audio[:10])
+    with pytest.raises(InputError, match="25 fps, the run"):
+        space.from_motion(talk(2.0, 1, fps=25.0).motion)
+    with pytest.raises(InputError, match="give longer ones"):
+        space.swap(codes, space.from_audio(talk(2.0, 3).audio))
