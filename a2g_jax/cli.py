@@ -206,6 +206,24 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="EDIT",
         help="of DCT bands, such as 'specific scale 0:10 1.5'; may be repeated",
     )
+    pin = generate.add_argument_group("clips on the timeline")
+    pin.add_argument(
+        "--pin", action="append", metavar="FILE@SECOND", help="a BVH or NPZ to perform from then on; may be repeated"
+    )
+    pin.add_argument(
+        "--pin-blend", type=_number(float, 0.0, 10.0, "seconds"), metavar="SECONDS", help="around each (default: 0.5)"
+    )
+    pin.add_argument(
+        "--pin-shared",
+        type=_number(float, 0.0, 1.0, "a number"),
+        metavar="SHARE",
+        help="of the clip's own shared code beside the audio's (default: 0, as in the paper)",
+    )
+    pin.add_argument(
+        "--pin-corpus",
+        metavar="CORPUS",
+        help="whose 99th percentile of jerk seams are held against (default: the clip's)",
+    )
     sampling(generate)
     return parser
 

@@ -24,9 +24,12 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation import retarget_command
 from a2g_jax.generation.deliver import check_formats, deliver
 from a2g_jax.generation.deliver_talk import check_talk_formats, deliver_talk
+from a2g_jax.generation.pin_report import describe
+from a2g_jax.generation.pinned import Pins
 from a2g_jax.generation.talk_request import TalkRequest, corpus_request
 from a2g_jax.inspection import command as inspect_command
 from a2g_jax.io.audio import read_audio
+from a2g_jax.io.files import read_json
 from a2g_jax.models import find_model
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig
@@ -282,7 +285,12 @@ def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     _cache_compilations()
     run = _edited(demo_run() if options.run == "demo" else load_run(options.run), options)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
-    _generate(run, audio, options, Path(options.audio).name)
+    pins = _pins(options)
+    _generate(run, audio, options, Path(options.audio).name, pins=pins)
+    if pins is not None:
+        for sample, rows in enumerate(read_json(Path(options.out) / "pins.json")):
+            for row in rows:
+                print(f"sample {sample}, {describe(row)}")
 
 
 def _edited(run: Run, options: argparse.Namespace) -> Run:
@@ -320,7 +328,22 @@ def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:
     _generate(run, audio, options, title, words)
 
 
-def _generate(run: Run, audio: Any, options: argparse.Namespace, title: str, words: Any = ()) -> None:
+def _pins(options: argparse.Namespace) -> Pins | None:
+    """The clips that the flags pin."""
+    if not options.pin:
+        for name in ("pin_blend", "pin_shared", "pin_corpus"):
+            if getattr(options, name) is not None:
+                raise InputError(f"--{name.replace('_', '-')} is for --pin; name a clip and a second.")
+        return None
+    blend = 0.5 if options.pin_blend is None else options.pin_blend
+    shared = 0.0 if options.pin_shared is None else options.pin_shared
+    corpus = None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
+    return Pins(tuple(options.pin), blend, shared, corpus)
+
+
+def _generate(
+    run: Run, audio: Any, options: argparse.Namespace, title: str, words: Any = (), pins: Pins | None = None
+) -> None:
     with progress_bar(options.samples, "generating", "motion") as bar:
         written = deliver(
             run,
@@ -331,6 +354,7 @@ def _generate(run: Run, audio: Any, options: argparse.Namespace, title: str, wor
             formats=options.formats,
             title=title,
             words=words,
+            pins=pins,
             report=lambda done: bar.update(done - bar.n),
         )
     kinds = ", ".join(f"{count} {kind}" for kind, count in written.items())

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -10,8 +11,9 @@ from jaxtyping import Float
 from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.generation.generate import Generator
+from a2g_jax.generation.pinned import Pins
 from a2g_jax.io.bvh import write_bvh
-from a2g_jax.io.files import make_folder
+from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.npz import write_motion_npz
 from a2g_jax.training.run import Run
 
@@ -45,14 +47,16 @@ def deliver(
     formats: str,
     title: str,
     words: Sequence[Word] = (),
+    pins: Pins | None = None,
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
-    """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``.
+    """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``; with pins also ``pins.json``.
 
     Args:
         audio: mono, at the run's sample rate.
         formats: comma-separated; see :func:`check_formats`.
         title: what was spoken, for the page's heading.
+        pins: clips that are pinned to moments of every sample.
         report: called with the number of samples done.
 
     Returns:
@@ -65,6 +69,7 @@ def deliver(
 
     kinds = check_formats(formats)
     generator = Generator(run)
+    pinned = None if pins is None else pins.place(run, generator.frames(audio))
     frames, joints = generator.frames(audio), run.config.skeleton.joints
     if "html" in kinds and samples * frames * joints > _PAGE_LIMIT:
         raise InputError(
@@ -73,11 +78,15 @@ def deliver(
         )
     out = make_folder(out)
     # What an earlier run left here would stand beside motions for another speech.
-    for old in (*out.glob("sample_*.bvh"), *out.glob("sample_*.npz"), *out.glob("index.html")):
-        if re.fullmatch(r"sample_\d+\.(bvh|npz)|index\.html", old.name):
+    for old in (*out.glob("sample_*.bvh"), *out.glob("sample_*.npz"), *out.glob("index.html"), *out.glob("pins.json")):
+        if re.fullmatch(r"sample_\d+\.(bvh|npz)|index\.html|pins\.json", old.name):
             old.unlink()
-    figures = []
-    for number, motion in enumerate(generator.stream(audio, samples, seed)):
+    figures: list[Figure] = []
+    followed: list[list[dict[str, Any]]] = []
+    motions = (
+        generator.stream(audio, samples, seed) if pinned is None else pinned.stream(audio, samples, seed, followed)
+    )
+    for number, motion in enumerate(motions):
         if "bvh" in kinds:
             write_bvh(out / f"sample_{number:02d}.bvh", motion)
         if "npz" in kinds:
@@ -85,6 +94,8 @@ def deliver(
         if "html" in kinds:
             figures.append(Figure(motion=motion, label=f"sample {number}"))
         report(number + 1)
+    if pinned is not None:
+        write_json(out / "pins.json", followed)
     if figures:
         write_page(
             out / "index.html",
@@ -94,5 +105,6 @@ def deliver(
             title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
             subtitle=f"{run.config.model}, {run.config.preset} preset, {run.steps} training steps, seed {seed}",
             words=words,
+            lanes=() if pinned is None else (pinned.lane(),),
         )
     return {kind: 1 if kind == "html" else samples for kind in kinds}

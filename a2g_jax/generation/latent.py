@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
 from a2g_jax.features.mel import log_mel
+from a2g_jax.generation.generate import WINDOW
 from a2g_jax.generation.root import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
@@ -47,7 +48,7 @@ class Codes:
 
 
 class LatentSpace:
-    """The codes of speech and motion, and back to motion; compiles once for each length in blocks of 128 frames."""
+    """The codes of speech and motion, and back to motion; compiles once for each number of 1024-frame windows."""
 
     def __init__(self, run: Run) -> None:
         """
@@ -136,7 +137,7 @@ class LatentSpace:
         parsed = [parse_edit(text, self.points) for text in edits]
         if other is None and any(edit.action in ("swap", "sample") for edit in parsed):
             raise InputError(f"{', '.join(edits)}: takes bands from another code; give one as 'other'.")
-        if other is not None and len(other.shared) < len(codes.shared):
+        if other is not None and other.frames < codes.frames:
             raise InputError(f"the other codes are {other.frames} frames long, these {codes.frames}; give longer ones.")
 
         def changed(name: str) -> Code:
@@ -152,10 +153,10 @@ class LatentSpace:
         Raises:
             InputError: the other is shorter.
         """
-        if len(other.specific) < len(codes.shared):
+        if other.frames < codes.frames:
             raise InputError(f"the other codes are {other.frames} frames long, these {codes.frames}; give longer ones.")
         return replace(codes, specific=other.specific[: len(codes.shared)])
 
     def _after(self, frames: int) -> int:
-        """Context behind, so that the whole is a number of blocks."""
-        return -frames % BLOCK + self._context
+        """Context behind, so that all speech up to a window's length shares a compiled program."""
+        return -frames % WINDOW + self._context

@@ -1,0 +1,136 @@
+"""Motion clips pinned to moments of a generated motion, through their codes (Audio2Gestures, extended, Sec. 6.4).
+
+The motion-specific code of the clip takes the place of the drawn one from frame t to t + n; the decoder makes the
+transitions. The shared code stays the audio's, as in the paper; a share of the clip's own can be blended in.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.generation.latent import Codes, LatentSpace
+from a2g_jax.geometry.motion import Motion, resample
+from a2g_jax.geometry.retarget import find_rig, match_rigs, retarget
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.npz import read_motion_npz
+
+#: Shortest clip that is pinned, seconds: shorter ones drown in their transitions.
+SHORTEST = 0.2
+
+
+class Pin(NamedTuple):
+    """A clip and where it is wanted."""
+
+    name: str
+    """Its file, for messages."""
+    start: float
+    """Seconds."""
+    motion: Motion
+    """On the run's skeleton, at its frame rate."""
+
+    @property
+    def first(self) -> int:
+        """First frame of the stretch."""
+        return round(self.start * self.motion.fps)
+
+    @property
+    def stop(self) -> int:
+        """Frame after its last."""
+        return self.first + self.motion.frames
+
+
+def parse_pin(text: str) -> tuple[Path, float]:
+    """File and second of ``wave.bvh@3.2``.
+
+    Raises:
+        InputError: of another form.
+    """
+    path, at, seconds = text.rpartition("@")
+    try:
+        start = float(seconds)
+    except ValueError:
+        start = float("nan")
+    if not at or not path or not 0.0 <= start < float("inf"):
+        raise InputError(f"--pin {text}: expected a file and a second from 0 on, such as wave.bvh@3.2.")
+    return Path(path), start
+
+
+def read_pin(text: str, skeleton: Skeleton, fps: float) -> Pin:
+    """The clip of ``wave.bvh@3.2``: any humanoid BVH, or an NPZ that this package wrote, on the run's skeleton.
+
+    Raises:
+        InputError: a file that cannot be read, a rig that is not understood, or a clip shorter than a fifth of a
+            second.
+    """
+    path, start = parse_pin(text)
+    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
+    if not motion.skeleton.same_tree(skeleton):
+        source = find_rig(motion, name=str(path))
+        motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
+    motion = resample(motion, fps)
+    if motion.seconds < SHORTEST:
+        raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST} s or more.")
+    return Pin(str(path), start, motion)
+
+
+def check_pins(pins: Sequence[Pin], frames: int, fps: float) -> list[Pin]:
+    """The pins in their order in time.
+
+    Raises:
+        InputError: a pin that ends after the speech, or two that overlap.
+    """
+    ordered = sorted(pins, key=lambda pin: pin.first)
+    for pin in ordered:
+        if pin.stop > frames:
+            raise InputError(
+                f"--pin {pin.name}@{pin.start:g}: ends at {pin.stop / fps:.2f} s, the speech at {frames / fps:.2f} s;"
+                " pin it earlier, or cut it."
+            )
+    for before, after in zip(ordered, ordered[1:], strict=False):
+        if after.first < before.stop:
+            raise InputError(
+                f"--pin {after.name}@{after.start:g}: begins before {before.name} ends at {before.stop / fps:.2f} s;"
+                " pins must not overlap."
+            )
+    return ordered
+
+
+def pin_weights(frames: int, first: int, stop: int, blend: int) -> Float[np.ndarray, " frames"]:
+    """One from ``first`` to ``stop - 1``, falling to zero over ``blend`` frames on either side as a raised cosine."""
+    frame = np.arange(frames)
+    outside = np.maximum(np.maximum(first - frame, frame - (stop - 1)), 0)
+    return 0.5 + 0.5 * np.cos(np.pi * np.minimum(outside / (blend + 1), 1.0))
+
+
+def pin_codes(
+    space: LatentSpace, codes: Codes, pins: Sequence[Pin], *, blend: float = 0.5, shared: float = 0.0
+) -> Codes:
+    """The codes with those of the clips in their places.
+
+    Around a clip its first and last pose are held for the width of the blend, weaker and weaker.
+
+    Args:
+        pins: as :func:`check_pins` gives them.
+        blend: seconds on either side of a clip.
+        shared: from 0 to 1, how far the clip's own shared code replaces the audio's; the paper has 0.
+    """
+    total = len(codes.specific)
+    mixed = {"specific": codes.specific, "shared": codes.shared}
+    for pin in pins:
+        own = space.from_motion(pin.motion)
+        width = min(round(blend * pin.motion.fps), own.context - 1)
+        weight = pin_weights(total, codes.context + pin.first, codes.context + pin.stop, width)
+        # Row r of the speech's codes shows what row r - shift of the clip's does.
+        rows = np.clip(np.arange(total) - (codes.context + pin.first - own.context), 0, len(own.specific) - 1)
+        for name, strength in (("specific", 1.0), ("shared", shared)):
+            if strength > 0:
+                share = jnp.asarray(strength * weight, jnp.float32)[:, None]
+                mixed[name] = (1.0 - share) * mixed[name] + share * getattr(own, name)[rows]
+    return replace(codes, specific=mixed["specific"], shared=mixed["shared"])

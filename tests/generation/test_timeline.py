@@ -1,0 +1,123 @@
+"""Pins: parsing, places, codes, and how closely they are followed."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from a2g_jax.cli import main
+from a2g_jax.data.talker.recordings import talk
+from a2g_jax.errors import InputError
+from a2g_jax.generation.latent import LatentSpace
+from a2g_jax.generation.pin_report import report_pins
+from a2g_jax.generation.timeline import Pin, check_pins, parse_pin, pin_codes, pin_weights, read_pin
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.audio import write_audio
+from a2g_jax.io.bvh import write_bvh
+from a2g_jax.training.run import demo_run
+
+
+def part(motion, first, stop):
+    """Frames of a motion."""
+    return Motion(motion.rotations[first:stop], motion.root[first:stop], motion.skeleton, motion.fps)
+
+
+@pytest.fixture(scope="module")
+def clip():
+    """Two seconds of somebody's gestures."""
+    return part(talk(10.0, 77, speaker="felix").motion, 90, 150)
+
+
+@pytest.fixture(scope="module")
+def speech():
+    return talk(8.0, 5)
+
+
+@pytest.mark.parametrize(("text", "path", "second"), [("a.bvh@3.2", "a.bvh", 3.2), ("b@c.npz@0", "b@c.npz", 0.0)])
+def test_parse(text, path, second):
+    assert parse_pin(text) == (Path(path), second)
+
+
+@pytest.mark.parametrize("text", ["a.bvh", "a.bvh@", "@3", "a.bvh@-1", "a.bvh@soon", "a.bvh@inf"])
+def test_refused(text):
+    with pytest.raises(InputError, match=r"such as wave\.bvh@3\.2"):
+        parse_pin(text)
+
+
+def test_pins_are_in_order_and_apart(clip):
+    early, late = Pin("early", 1.0, clip), Pin("late", 4.0, clip)
+    assert [pin.name for pin in check_pins([late, early], 240, 30.0)] == ["early", "late"]
+    with pytest.raises(InputError, match=r"late@4: ends at 6\.00 s, the speech at 5\.00 s"):
+        check_pins([late, early], 150, 30.0)
+    with pytest.raises(InputError, match="must not overlap"):
+        check_pins([early, Pin("other", 2.9, clip)], 240, 30.0)
+
+
+def test_weights():
+    weights = pin_weights(20, 8, 12, 3)
+    np.testing.assert_array_equal(weights[8:12], 1.0)
+    np.testing.assert_allclose(weights[5:8], weights[12:15][::-1])
+    assert np.all(np.diff(weights[4:9]) > 0)
+    assert weights[:5].max() == 0.0 == weights[15:].max()
+    np.testing.assert_array_equal(pin_weights(20, 8, 12, 0) > 0, (np.arange(20) >= 8) & (np.arange(20) < 12))
+
+
+def test_codes_are_the_clips_where_it_is_pinned_and_the_drawn_ones_elsewhere(clip, speech):
+    space = LatentSpace(demo_run())
+    codes = space.from_audio(speech.audio)
+    own = space.from_motion(clip)
+    pin = Pin("clip", 3.0, clip)
+    mixed = pin_codes(space, codes, [pin], blend=0.2)
+    at, length = codes.context + 90, clip.frames
+    np.testing.assert_allclose(
+        mixed.specific[at : at + length], own.specific[own.context : own.context + length], atol=1e-6
+    )
+    np.testing.assert_array_equal(mixed.specific[: at - 7], codes.specific[: at - 7])
+    np.testing.assert_array_equal(mixed.specific[at + length + 7 :], codes.specific[at + length + 7 :])
+    np.testing.assert_array_equal(mixed.shared, codes.shared)
+    both = pin_codes(space, codes, [pin], blend=0.2, shared=1.0)
+    np.testing.assert_allclose(both.shared[at : at + length], own.shared[own.context : own.context + length], atol=1e-6)
+
+
+def test_a_pin_is_followed_and_the_report_says_what_is_not(clip, speech):
+    space = LatentSpace(demo_run())
+    codes = space.from_audio(speech.audio)
+    plain, pin = space.to_motion(codes), Pin("clip", 3.0, clip)
+    moved = space.to_motion(pin_codes(space, codes, [pin], shared=1.0))
+    (row,) = report_pins([pin], moved, plain, 1e4, "a test")
+    assert row["error_cm"] < 0.6 * row["unpinned_error_cm"]
+    assert row["smooth"]
+    (ignored,) = report_pins([pin], plain, plain, 1.0, "a test")
+    assert ignored["error_cm"] == ignored["unpinned_error_cm"]
+    assert not ignored["followed"]
+    assert not ignored["smooth"]
+
+
+def test_another_rig_and_rate_are_brought_to_the_runs(clip, tmp_path):
+    write_bvh(tmp_path / "wave.bvh", talk(3.0, 4, fps=60.0, fingers=True).motion)
+    skeleton = demo_run().config.skeleton
+    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1.5", skeleton, 30.0)
+    assert (pin.first, pin.motion.frames, pin.motion.skeleton.joints) == (45, 90, 22)
+    write_bvh(tmp_path / "blink.bvh", part(clip, 0, 3))
+    with pytest.raises(InputError, match=r"lasts 0\.10 s"):
+        read_pin(f"{tmp_path / 'blink.bvh'}@1.5", skeleton, 30.0)
+
+
+def test_from_the_command_line(clip, speech, tmp_path, capsys):
+    write_audio(tmp_path / "speech.wav", speech.audio, 16000)
+    write_bvh(tmp_path / "wave.bvh", clip)
+    out = tmp_path / "out"
+    command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "2", "--out", str(out)]
+    assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@3"]) == 0
+    told = capsys.readouterr().out
+    assert told.count("cm from the clip") == 2
+    rows = json.loads((out / "pins.json").read_text())
+    assert [len(sample) for sample in rows] == [1, 1]
+    assert rows[0][0]["end"] == 5.0
+    assert (out / "sample_01.bvh").exists()
+    assert "pinned" in (out / "index.html").read_text()
+    assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@7"]) == 2
+    assert "pin it earlier" in capsys.readouterr().err
+    assert main([*command, "--pin-blend", "1"]) == 2
+    assert "--pin-blend is for --pin" in capsys.readouterr().err
