@@ -107,8 +107,25 @@ def test_generated_talk_as_data_sets_show_it(tmp_path, capsys, view):
     with pytest.raises(InputError, match="holds (directions|keypoints) and no skeleton"):
         _ = corpus.skeleton
     capsys.readouterr()
-    assert main(["train", "audio2gestures", "--corpus", str(out), "--out", str(tmp_path / "run")]) == 2
-    assert "this needs 6d" in capsys.readouterr().err
+    run = str(tmp_path / "run")
+    quick = [
+        "--steps",
+        "2",
+        "--clip-frames",
+        "16",
+        "--batch-size",
+        "2",
+        "--audio-channels",
+        "4",
+        "--motion-channels",
+        "4",
+    ]
+    assert main(["train", "audio2gestures", "--corpus", str(out), "--out", run, *quick]) == 0
+    write_audio(tmp_path / "speech.wav", np.asarray(talk(2.0, 1).audio), 16000)
+    capsys.readouterr()
+    assert main(["generate", run, "--audio", str(tmp_path / "speech.wav"), "--out", str(tmp_path / "made")]) == 2
+    assert "have no skeleton" in capsys.readouterr().err
+    assert not (tmp_path / "made").exists()
 
 
 def test_broken_recordings_end_the_work_or_are_left_out(tmp_path, folder, capsys):
