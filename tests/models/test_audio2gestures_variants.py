@@ -1,0 +1,195 @@
+"""Backbones, the DCT latent space, variants without a part, structured losses, and poses without a skeleton."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from a2g_jax.data.poses import PoseLayout
+from a2g_jax.errors import InputError
+from a2g_jax.features.dct import block_dct
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.models.audio2gestures import PRESETS, build
+from a2g_jax.models.audio2gestures.codec import Networks
+from a2g_jax.models.base import Batch, Data
+
+BANDS, JOINTS, FRAMES = 5, 4, 32
+RNG = np.random.default_rng(0)
+SKELETON = Skeleton(RNG.normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), tuple("abcd"), (-1, 0, 1, 1))
+DATA = Data(
+    SKELETON,
+    30.0,
+    BANDS,
+    Statistics(RNG.normal(size=(JOINTS, 6)).astype(np.float32), np.full((JOINTS, 6), 0.5, np.float32)),
+)
+KEYPOINTS = Data(
+    PoseLayout(tuple("abcd"), ((0, 1), (1, 2), (1, 3))),
+    15.0,
+    BANDS,
+    Statistics(RNG.normal(size=(JOINTS, 2)).astype(np.float32), np.full((JOINTS, 2), 3.0, np.float32)),
+    "keypoints",
+)
+BASE = replace(
+    PRESETS["tiny"],
+    audio_channels=(6,),
+    motion_channels=(6,),
+    decoder_channels=(6,),
+    head_channels=6,
+    code_channels=3,
+    clip_frames=FRAMES,
+    dct_points=FRAMES,
+    kl_ramp_steps=0,
+    alignment_ramp_steps=0,
+    sample_codes=True,
+)
+VARIANTS = {
+    "gru": {"backbone": "gru", "recurrent_layers": 2, "recurrent_channels": 3},
+    "transformer": {"backbone": "transformer", "attention_layers": 2, "attention_channels": 4, "attention_hidden": 6},
+    "dct": {"latent": "dct"},
+    "no split": {"split": False},
+    "no mapping": {"mapping": False},
+    "structured": {"stft_weight": 0.5, "ssim_weight": 0.5},
+}
+
+
+def batch(data, frames=FRAMES, dtype=np.float32):
+    random = np.random.default_rng(1)
+    width = data.pose_statistics.mean.shape
+    pose = np.cumsum(random.normal(scale=0.1, size=(2, frames, *width)), axis=1) + 1.0
+    return Batch(jnp.asarray(random.normal(size=(2, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
+
+
+def params_of(model, dtype=np.float32):
+    """Random ones for every leaf, biases too."""
+    random = np.random.default_rng(3)
+
+    def fill(leaf):
+        width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
+        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
+
+    return jax.tree.map(fill, jax.eval_shape(model.init, jax.random.key(0)))
+
+
+@pytest.mark.parametrize("name", ["gru", "transformer", "dct", "no split", "keypoints"])
+def test_every_parameter_learns(name):
+    data = KEYPOINTS if name == "keypoints" else DATA
+    model = build(replace(BASE, **VARIANTS.get(name, {})), data)
+    params = params_of(model)
+    step = jax.jit(jax.value_and_grad(model.loss, has_aux=True))
+    (loss, terms), gradient = step(params, jax.random.key(0), batch(data), jnp.int32(5))
+    assert np.isfinite(loss)
+    assert all(np.isfinite(value) for value in terms.values())
+    for path, leaf in jax.tree_util.tree_leaves_with_path(gradient):
+        assert np.abs(leaf).max() > 0, jax.tree_util.keystr(path)
+    assert ("rotation" in terms) == (name != "keypoints")
+    assert ("bicycle" in terms) == (name != "no split")
+    assert ("mapping_net" in params) == (name not in ("no split", "no mapping"))
+    assert ("kl_shared" in terms) == (name != "dct")
+
+
+@pytest.mark.parametrize("name", ["transformer", "dct", "no split", "no mapping"])
+def test_windows_give_the_motion_of_one_pass(name):
+    model = build(replace(BASE, **VARIANTS[name]), DATA)
+    params = params_of(model)
+    code = jnp.asarray(np.random.default_rng(6).uniform(0.5, 1, size=(4, 3)), jnp.float32)
+    summary = {"specific_mean": code, "specific_std": code}
+    audio = np.random.default_rng(8).normal(size=(384, BANDS)).astype(np.float32)
+
+    @jax.jit
+    def sample(audio, start):
+        return model.sample(params, summary, jax.random.key(0), model.condition(params, audio), start)
+
+    whole, window = np.asarray(sample(audio, jnp.int32(0))), np.asarray(sample(audio[128:], jnp.int32(128)))
+    np.testing.assert_allclose(window[model.halo :], whole[128 + model.halo :], atol=2e-5)
+    assert np.abs(np.asarray(sample(audio[::-1], jnp.int32(0))) - whole).mean() > 1e-3
+
+
+def test_a_gru_forgets_within_its_context():
+    """Its memory has no end; what is left of it after the context that generation gives is far below a millimetre."""
+    model = build(replace(BASE, **VARIANTS["gru"]), DATA)
+    params = params_of(model)
+    random = np.random.default_rng(8)
+    audio = random.normal(size=(640, BANDS)).astype(np.float32)
+    other = np.concatenate([random.normal(size=(128, BANDS)).astype(np.float32), audio[128:]])
+    encode = jax.jit(lambda audio: model.condition(params, audio).mean)
+    first, second = np.asarray(encode(audio))[0], np.asarray(encode(other))[0]
+    assert np.abs(first - second)[:128].max() > 0.1
+    assert np.abs(first - second)[128 + 256 :].max() < 1e-5
+
+
+def test_the_shared_code_of_the_dct_space_is_certain_and_the_specific_one_has_a_spread_for_each_band():
+    config = replace(BASE, latent="dct")
+    networks = Networks(config, DATA)
+    params = params_of(build(config, DATA))
+    shared, specific = networks.encode_motion(params, batch(DATA, 2 * FRAMES).pose)
+    np.testing.assert_array_equal(shared.sample(jax.random.key(0)), shared.mean)
+    assert np.asarray(specific.log_variance).std(axis=1).min() > 0
+    # The shared head is linear, so it is the same in time and in bands.
+    alone = networks.encode_motion(params, batch(DATA, 2 * FRAMES).pose[:, FRAMES:])[0]
+    np.testing.assert_allclose(shared.mean[:, FRAMES:], alone.mean, atol=1e-5)
+    np.testing.assert_allclose(block_dct(networks.to_time(shared.mean), FRAMES), shared.mean, atol=1e-5)
+    with pytest.raises(ValueError, match="multiple of 32 frames"):
+        networks.encode_motion(params, batch(DATA, 40).pose)
+
+
+def test_edits_are_made_in_generation_alone():
+    plain = build(replace(BASE, latent="dct"), DATA)
+    edited = build(replace(BASE, latent="dct", edits=("specific keep 0", "shared sample 0:32 3")), DATA)
+    params = params_of(plain)
+    summary = {"specific_mean": jnp.ones((1, 3)), "specific_std": jnp.ones((1, 3))}
+    audio = batch(DATA, 128).audio[0]
+
+    def sample(model, key):
+        return model.sample(params, summary, key, model.condition(params, audio), jnp.int32(0))
+
+    first, second = (sample(edited, jax.random.key(n)) for n in (0, 1))
+    np.testing.assert_allclose(first, second, atol=1e-5)  # nothing that is drawn is left
+    assert np.abs(np.asarray(sample(plain, jax.random.key(0)) - sample(plain, jax.random.key(1)))).max() > 1e-3
+    one, two = (model.loss(params, jax.random.key(0), batch(DATA), jnp.int32(0))[0] for model in (plain, edited))
+    assert one == two
+
+
+def test_gradients_of_structured_and_perceptual_losses(x64):
+    """Of the whole objective, against differences."""
+    weights = jnp.asarray(np.random.default_rng(9).normal(size=(JOINTS * 6, 3)))
+
+    def features(pose):
+        return [jnp.tanh(pose.reshape(*pose.shape[:2], -1) @ weights.astype(pose.dtype))]
+
+    silent = {f"{name}_weight": 0.0 for name in ("rotation", "relaxed", "bicycle", "diversity", "sampled_rotation")}
+    config = replace(BASE, **silent, stft_weight=0.5, ssim_weight=0.5, lpips_weight=0.5)
+    model = build(config, DATA._replace(perceptual=features))
+    params, clips = params_of(model, np.float64), batch(DATA, dtype=np.float64)
+    bias = params["decoder"]["Dense_0"]["bias"]
+
+    def loss(bias):
+        decoder = {**params["decoder"], "Dense_0": {**params["decoder"]["Dense_0"], "bias": bias}}
+        return model.loss({**params, "decoder": decoder}, jax.random.key(0), clips, jnp.int32(5))[0]
+
+    check_grads(jax.jit(loss), (bias,), order=1, modes=["rev"], atol=1e-3, rtol=1e-3)
+    terms = model.loss(params, jax.random.key(0), clips, jnp.int32(5))[1]
+    assert min(terms[name] for name in ("stft", "ssim", "lpips")) > 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"lpips_weight": 1.0}, "train one with 'a2g train motion_autoencoder'"),
+        ({"stft_weight": 1.0, "clip_frames": 16}, "clips of 32 frames or more"),
+        ({"backbone": "rnn"}, "expected one of tcn, gru, transformer"),
+        ({"latent": "dct", "clip_frames": 40}, "multiple of --dct-points 32"),
+        ({"latent": "dct", "split": False}, "no DCT variant"),
+        ({"latent": "dct", "dct_points": 24, "clip_frames": 24}, "divisor of 128"),
+        ({"attention_window": 7}, "an even number"),
+        ({"edits": ("shared swap 0:3",)}, "only Python can give"),
+        ({"edits": ("shared blur",)}, "for example"),
+        ({"recurrent_layers": 0}, "--recurrent-layers: expected 1 or more"),
+    ],
+)
+def test_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        build(replace(BASE, **changes), DATA)
