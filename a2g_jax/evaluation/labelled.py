@@ -18,6 +18,7 @@ from a2g_jax.evaluation.places import Pose
 from a2g_jax.io.files import sha256_file
 from a2g_jax.models.base import Batch
 from a2g_jax.models.emotion_classifier.model import classify
+from a2g_jax.training.feature_run import check_sight
 from a2g_jax.training.run import WEIGHTS_FILE, Run, load_run
 
 
@@ -64,13 +65,7 @@ def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> Emotio
             f"{folder}: is no classifier of emotions in motion; train one with 'a2g train"
             " emotion_classifier --input motion'."
         )
-    there = (config.representation, config.statistics["pose"].mean.shape, config.fps)
-    here = (corpus.representation, corpus.statistics["pose"].mean.shape, corpus.fps)
-    if there != here:
-        raise InputError(
-            f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds"
-            f" {here[0]} {here[1]} at {here[2]:g} fps; train one on such a corpus."
-        )
+    check_sight(str(folder), config, corpus)
     if not set(corpus.emotions) & set(config.corpus["emotions"]):
         raise InputError(
             f"{folder}: knows the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."

@@ -15,7 +15,7 @@ from a2g_jax.io.files import sha256_file
 from a2g_jax.models.motion_autoencoder import encode
 
 if TYPE_CHECKING:
-    from a2g_jax.training.run import Run
+    from a2g_jax.training.run import Run, RunConfig
 
 FEATURE_MODEL = "motion_autoencoder"
 
@@ -48,6 +48,16 @@ def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple["R
     config = run.config
     if config.model != FEATURE_MODEL:
         raise InputError(f"{folder}: is a run of {config.model}; a feature network is one of {FEATURE_MODEL}.")
+    check_sight(str(folder), config, corpus)
+    return run, fingerprint
+
+
+def check_sight(folder: str, config: "RunConfig", corpus: Corpus) -> None:
+    """Refuse a network that looks at other motion than a corpus has.
+
+    Raises:
+        InputError: other joints, poses or frame rate.
+    """
     there = (config.representation, config.statistics["pose"].mean.shape, config.fps)
     here = (corpus.representation, corpus.statistics["pose"].mean.shape, corpus.fps)
     if there != here:
@@ -55,7 +65,6 @@ def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple["R
             f"{folder}: looks at {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
             f" at {here[2]:g} fps; train one on such a corpus, or prepare the corpus so (--fps, --pose, --joints)."
         )
-    return run, fingerprint
 
 
 def load_perceptual(folder: str | os.PathLike[str], corpus: Corpus) -> Perceptual:
