@@ -122,15 +122,22 @@ def pin_codes(
         shared: from 0 to 1, how far the clip's own shared code replaces the audio's; the paper has 0.
     """
     total = len(codes.specific)
-    mixed = {"specific": codes.specific, "shared": codes.shared}
-    for pin in pins:
+    places = [(codes.context + pin.first, codes.context + pin.stop) for pin in pins]
+    weights = np.zeros((len(pins), total))
+    for number, (pin, (first, stop)) in enumerate(zip(pins, places, strict=True)):
+        weights[number] = pin_weights(total, first, stop, round(blend * pin.motion.fps))
+    # Where a clip stands, no neighbour's blend reaches in; between two close ones they share.
+    for number, (first, stop) in enumerate(places):
+        weights[np.arange(len(pins)) != number, first:stop] = 0.0
+    weights /= np.maximum(weights.sum(axis=0), 1.0)
+    left = jnp.asarray(1.0 - weights.sum(axis=0), jnp.float32)[:, None]
+    mixed = {"specific": left * codes.specific}
+    mixed["shared"] = (1.0 - shared * (1.0 - left)) * codes.shared
+    for pin, weight, (first, _) in zip(pins, weights, places, strict=True):
         own = space.from_motion(pin.motion)
-        width = min(round(blend * pin.motion.fps), own.context - 1)
-        weight = pin_weights(total, codes.context + pin.first, codes.context + pin.stop, width)
         # Row r of the speech's codes shows what row r - shift of the clip's does.
-        rows = np.clip(np.arange(total) - (codes.context + pin.first - own.context), 0, len(own.specific) - 1)
-        for name, strength in (("specific", 1.0), ("shared", shared)):
-            if strength > 0:
-                share = jnp.asarray(strength * weight, jnp.float32)[:, None]
-                mixed[name] = (1.0 - share) * mixed[name] + share * getattr(own, name)[rows]
+        rows = np.clip(np.arange(total) - (first - own.context), 0, len(own.specific) - 1)
+        share = jnp.asarray(weight, jnp.float32)[:, None]
+        mixed["specific"] = mixed["specific"] + share * own.specific[rows]
+        mixed["shared"] = mixed["shared"] + shared * share * own.shared[rows]
     return replace(codes, specific=mixed["specific"], shared=mixed["shared"])

@@ -2,8 +2,8 @@
 
     python -m experiments.audio2gestures.pins RUN --corpus CORPUS [--pins 40] [--seed 0]
 
-Clips of one to three seconds of test recordings are pinned at random moments of the speech of other test recordings,
-each with a sample of its own. Writes ``results/pins.json``.
+Clips of one to three seconds of newly generated recordings are pinned at random moments of the speech of others by the
+same speaker, each with a sample of its own. Writes ``results/pins.json``.
 """
 
 import argparse
