@@ -31,6 +31,29 @@ def frame_normal(
     return noise.reshape(blocks * BLOCK, channels)[:frames]
 
 
+def slow_normal(
+    key: Key[Array, ""], start: Int[Array, ""], frames: int, channels: int, period: int
+) -> Float[Array, "frames channels"]:
+    """Standard normal noise that is drawn anew every ``period`` frames and turns smoothly from draw to draw.
+
+    Between draws a and b it is ``a cos(t) + b sin(t)``, t from 0 to pi / 2: every single frame is standard normal.
+
+    Args:
+        start: any absolute frame; the same frame gets the same values in every window.
+        period: frames between draws; 1 for :func:`frame_normal`, whose ``start`` must be a multiple of 128.
+    """
+    if period == 1:
+        return frame_normal(key, start, frames, channels)
+    number, first = start // period, start % period
+    count = -(-frames // period) + 2
+    keys = jax.vmap(lambda n: jax.random.fold_in(key, n.astype(jnp.uint32)))(number + jnp.arange(count))
+    draws = jax.vmap(lambda k: jax.random.normal(k, (channels,)))(keys)
+    frame = first + jnp.arange(frames)
+    index = frame // period
+    angle = (0.5 * jnp.pi / period * (frame % period))[:, None]
+    return draws[index] * jnp.cos(angle) + draws[index + 1] * jnp.sin(angle)
+
+
 def blended_draws(key: Key[Array, ""], table: Tree, start: Int[Array, ""], frames: int, period: int) -> Tree:
     """Rows drawn at random from a table, one for every ``period`` frames, blended linearly in between.
 

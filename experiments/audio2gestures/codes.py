@@ -77,7 +77,10 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
 
     made = np.asarray(decode(clips[[a for a, _ in pairs]], clips[[b for _, b in pairs]]))
     peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
-    hand, own, donor, stranger = [], [], [], []
+    hand: list[float] = []
+    own: list[float] = []
+    donor: list[float] = []
+    stranger: list[float] = []
     for (a, b), pose in zip(pairs, made, strict=True):
         ours = wrist_speeds(body, pose, fps)
         hand.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))

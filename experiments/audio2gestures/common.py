@@ -17,7 +17,7 @@ import numpy as np
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.evaluate import evaluate
-from a2g_jax.evaluation.feature_network import load_feature_network
+from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_network
 from a2g_jax.models import find_model
 from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.feature_run import load_perceptual
@@ -45,7 +45,8 @@ class Setting:
     """Where runs are made, on what, and how long."""
 
     corpus: Path
-    features: Path
+    features: Path | None
+    """Without a feature network there is no FGD and no LPIPS."""
     runs: Path
     steps: int
     samples: int
@@ -87,14 +88,8 @@ def records(table: str) -> list[dict[str, Any]]:
 def run_table(table: str, variants: Mapping[str, Variant], where: Setting, only: Sequence[str] | None = None) -> None:
     """Train and score every variant with every seed that has no record yet, seed by seed."""
     began = time.monotonic()
-    corpus = Corpus.open(where.corpus)
-    network = load_feature_network(where.features, corpus)
-    conditions = {
-        "corpus": corpus.fingerprint[:16],
-        "feature_network": network.fingerprint[:16],
-        "steps": where.steps,
-        "samples": where.samples,
-    }
+    corpus, network, measured = _measure(where)
+    conditions = {**measured, "steps": where.steps}
     for seed in where.seeds:
         for name, variant in variants.items():
             if only is not None and name not in only:
@@ -137,17 +132,38 @@ def append(table: str, record: Mapping[str, Any]) -> None:
 
 def baselines(table: str, where: Setting) -> None:
     """Score the truth and what is neither it nor a model, once for a corpus and a feature network."""
-    corpus = Corpus.open(where.corpus)
-    network = load_feature_network(where.features, corpus)
-    wanted = {"corpus": corpus.fingerprint[:16], "feature_network": network.fingerprint[:16], "samples": where.samples}
-    if any(
-        record["variant"] == "truth" and all(record.get(key) == value for key, value in wanted.items())
-        for record in records(table)
-    ):
+    corpus, network, wanted = _measure(where)
+
+    def found(name: str) -> list[dict[str, Any]]:
+        return [
+            record
+            for record in records(name)
+            if record["steps"] == 0 and all(record.get(key) == value for key, value in wanted.items())
+        ]
+
+    if found(table):
         return
-    result = evaluate({}, corpus, samples=where.samples, seed=0, network=network)
-    for row in result["rows"]:
-        append(table, {"variant": row["name"], "seed": 0, **wanted, "steps": 0, "scores": row["scores"]})
+    # Those of another table of the same corpus are the same.
+    rows = next((found(path.stem) for path in sorted(RESULTS.glob("*.jsonl")) if found(path.stem)), None)
+    if rows is None:
+        result = evaluate({}, corpus, samples=where.samples, seed=0, network=network)
+        rows = [
+            {"variant": row["name"], "seed": 0, **wanted, "steps": 0, "scores": row["scores"]} for row in result["rows"]
+        ]
+    for row in rows:
+        append(table, row)
+
+
+def _measure(where: Setting) -> tuple[Corpus, FeatureNetwork | None, dict[str, Any]]:
+    """The corpus, the feature network, and what of them a record notes."""
+    corpus = Corpus.open(where.corpus)
+    network = None if where.features is None else load_feature_network(where.features, corpus)
+    measured = {
+        "corpus": corpus.fingerprint[:16],
+        "feature_network": None if network is None else network.fingerprint[:16],
+        "samples": where.samples,
+    }
+    return corpus, network, measured
 
 
 def _described(
@@ -165,7 +181,7 @@ def _described(
         validate_every=400,
     )
     needs = getattr(config, "lpips_weight", 0.0) > 0
-    perceptual = load_perceptual(where.features, corpus) if needs else None
+    perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
     described = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
     return _digest(described, variant.generation), described
 

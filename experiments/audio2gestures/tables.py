@@ -7,6 +7,7 @@ from a2g_jax.evaluation.scores import METRICS
 from experiments.audio2gestures.common import (
     RESULTS,
     Claim,
+    Setting,
     Variant,
     arguments,
     baselines,
@@ -40,9 +41,20 @@ def make(
     """The command of a table: train and score what is missing, and draw it; without a corpus, only draw it."""
     options = arguments(title).parse_args()
     if options.corpus is not None:
-        where = setting(options)
-        baselines(table, where)
-        run_table(table, variants, where, options.only.split(",") if options.only else None)
+        compute(table, variants, setting(options), options.only.split(",") if options.only else None)
+    draw(table, title, variants, claims, paper)
+
+
+def compute(table: str, variants: Mapping[str, Variant], where: Setting, only: Sequence[str] | None) -> None:
+    """Train and score what is missing."""
+    baselines(table, where)
+    run_table(table, variants, where, only)
+
+
+def draw(
+    table: str, title: str, variants: Mapping[str, Variant], claims: Sequence[Claim], paper: Mapping[str, str]
+) -> None:
+    """Write a table's Markdown beside its records, and print it."""
     text = render(table, title, list(variants), claims, paper)
     (RESULTS / f"{table}.md").write_text(text + "\n", encoding="utf-8")
     print(text)
@@ -57,8 +69,8 @@ def render(
     extra: Sequence[str] = ("beat_alignment",),
 ) -> str:
     """Markdown with our table, what the paper reports and whether its claims hold here."""
-    columns = [*COLUMNS, *extra]
     found = records(table)
+    columns = [name for name in (*COLUMNS, *extra) if any(name in record["scores"] for record in found)]
     names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
     head = " | ".join(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in columns)
     lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]

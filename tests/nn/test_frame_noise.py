@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
-from a2g_jax.nn.noise import BLOCK, blended_draws, frame_normal
+from a2g_jax.nn.noise import BLOCK, blended_draws, frame_normal, slow_normal
 
 KEY = jax.random.key(3)
 normal = partial(jax.jit(frame_normal, static_argnums=(2, 3)), KEY)
@@ -96,3 +96,28 @@ def test_a_table_of_one_row_never_changes():
     result = draws(KEY, table, start_at(-40), 90, 20)
     np.testing.assert_allclose(result["mean"], np.full((90, 3), 7.0))
     np.testing.assert_allclose(result["std"], np.ones((90, 2)))
+
+
+class TestSlowNormal:
+    @staticmethod
+    def noise(start, frames, period, key=KEY):
+        return np.asarray(jax.jit(slow_normal, static_argnums=(2, 3, 4))(key, start_at(start), frames, 2, period))
+
+    def test_windows_agree(self):
+        long = self.noise(-60, 240, 20)
+        for start in (-60, -7, 0, 13, 20):
+            np.testing.assert_allclose(self.noise(start, 100, 20), long[start + 60 : start + 160], atol=1e-6)
+
+    def test_every_frame_is_standard_normal(self):
+        keys = jax.random.split(KEY, 2000)
+        many = np.asarray(jax.jit(jax.vmap(lambda key: slow_normal(key, start_at(3), 32, 1, 16)))(keys))[..., 0]
+        for frame in (0, 5, 13, 31):
+            assert stats.kstest(many[:, frame], "norm").pvalue > 0.001
+        assert abs(np.corrcoef(many[:, 0], many[:, 31])[0, 1]) < 0.1
+        assert np.corrcoef(many[:, 0], many[:, 2])[0, 1] > 0.9
+
+    def test_neighbours_are_close(self):
+        assert np.abs(np.diff(self.noise(0, 500, 32), axis=0)).max() < 0.4
+
+    def test_period_one_has_no_memory(self):
+        np.testing.assert_array_equal(self.noise(0, 200, 1), normal(start_at(0), 200, 2))

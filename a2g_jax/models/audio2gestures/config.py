@@ -85,6 +85,12 @@ class Audio2GesturesConfig:
     diversity_decay_steps: int = 500_000
     """Steps over which the diversity weight falls linearly to zero; 0 for never."""
 
+    noise_frames: int = 1
+    """Frames between draws of the noise that the mapping net is given; 1 for noise without memory, as in the papers.
+
+    Such noise says at once everything about a clip and nothing about what changes within it, because the decoder
+    averages it away. Noise that changes every half second makes samples differ in what they do next as well.
+    """
     redraw_frames: int = 0
     """In generation, frames after which the motion-specific code's statistics are drawn anew, with linear blending.
 
@@ -124,6 +130,10 @@ class Audio2GesturesConfig:
         for name, known in (("backbone", ("tcn", "gru", "transformer")), ("latent", ("time", "dct"))):
             if getattr(self, name) not in known:
                 raise InputError(f"--{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}.")
+        if self.noise_frames < 1:
+            raise InputError(f"--noise-frames: expected 1 or more; got {self.noise_frames}.")
+        if self.latent == "dct" and self.noise_frames > 1:
+            raise InputError("--noise-frames: bands of the DCT have no order in time; use 1 with --latent dct.")
         if self.latent == "dct" and self.clip_frames % self.dct_points:
             raise InputError(
                 f"--clip-frames: expected a multiple of --dct-points {self.dct_points}; got {self.clip_frames}."

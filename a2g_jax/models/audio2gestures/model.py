@@ -10,7 +10,7 @@ from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.networks import MAPPING_LAYERS, Gaussian
 from a2g_jax.models.audio2gestures.objective import check_objective, terms, total, weights
 from a2g_jax.models.base import Batch, Data, Model, Params, Summary
-from a2g_jax.nn.noise import blended_draws, frame_normal
+from a2g_jax.nn.noise import blended_draws, frame_normal, slow_normal
 from a2g_jax.nn.tcn import receptive_halo
 
 #: Frames on either side that a GRU is given to settle in; it has no end of its memory, but forgets.
@@ -118,7 +118,7 @@ def _draw(networks, params, summary, key, shared, start):
     audio_code = networks.to_time(audio_code)
     if not config.split:
         return audio_code, None
-    noise = config.noise_scale * frame_normal(noise_key, start, frames, channels)
+    noise = config.noise_scale * slow_normal(noise_key, start, frames, channels, config.noise_frames)
     if not config.mapping:
         return audio_code, noise[None]
     mean, std = blended_draws(

@@ -1,0 +1,57 @@
+"""Real recordings: trained on the first part of one take, scored on the rest of it.
+
+    a2g prepare beat DIR --out BEAT --fps 30 --random-split
+    a2g prepare zeroeggs DIR --out ZEGGS --fps 30 --random-split
+    python -m experiments.audio2gestures.real --beat BEAT --zeroeggs ZEGGS [--steps 1000]
+
+A take of a minute says little of a method: the intervals are over clips of one recording and over seeds. There is no
+feature network, because a network trained on a minute of motion measures nothing. Weights trained on research-only
+recordings stay where ``--runs`` puts them.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from experiments.audio2gestures.common import Claim, Variant, arguments, setting
+from experiments.audio2gestures.tables import compute, draw
+
+VARIANTS = {
+    "Audio2Gestures without split": Variant({"split": False, "sample_codes": True}),
+    "Audio2Gestures": Variant({}),
+    "Speech2Gesture without GAN": Variant({"adversarial_weight": 0.0}, model="speech2gesture"),
+}
+
+CLAIMS = (
+    Claim(
+        "split raises multimodality from near zero",
+        "Audio2Gestures",
+        "Audio2Gestures without split",
+        "multimodality",
+        1,
+    ),
+    Claim(
+        "split harms position L1 beside Speech2Gesture",
+        "Audio2Gestures",
+        "Speech2Gesture without GAN",
+        "position_l1",
+        1,
+    ),
+)
+
+
+def main() -> None:
+    """Train and score what is missing, and draw a table for each take."""
+    parser = arguments("Real takes: the first part trains, the rest is scored")
+    parser.add_argument("--beat", type=Path, help="a corpus of BEAT, at 30 fps")
+    parser.add_argument("--zeroeggs", type=Path, help="a corpus of ZeroEGGS, at 30 fps")
+    options = parser.parse_args()
+    for name in ("beat", "zeroeggs"):
+        corpus = getattr(options, name)
+        if corpus is not None:
+            where = replace(setting(options), corpus=corpus, features=None)
+            compute(f"real_{name}", VARIANTS, where, options.only.split(",") if options.only else None)
+        draw(f"real_{name}", f"A take of {name.upper()}", VARIANTS, CLAIMS, {})
+
+
+if __name__ == "__main__":
+    main()

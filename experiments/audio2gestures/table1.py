@@ -1,0 +1,85 @@
+"""Table 1: Audio2Gestures beside Speech2Gesture, in 3D and in 2D.
+
+    python -m experiments.audio2gestures.table1 --corpus CORPUS --features RUN \\
+        --corpus-2d CORPUS --features-2d RUN [--budget MINUTES]
+
+The 2D corpus is one of ``a2g prepare talker --view s2g``: 49 keypoints at 15 fps, clips of 64 frames. Without a corpus
+the tables are drawn from the records that there are.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from experiments.audio2gestures.common import Claim, Variant, arguments, setting
+from experiments.audio2gestures.tables import compute, draw
+
+OURS, WITHOUT_GAN, WITH_GAN = "Audio2Gestures", "Speech2Gesture without GAN", "Speech2Gesture"
+
+
+def _rows(clip_frames: int) -> dict[str, Variant]:
+    clips = {"clip_frames": clip_frames}
+    return {
+        WITHOUT_GAN: Variant({**clips, "adversarial_weight": 0.0}, model="speech2gesture"),
+        WITH_GAN: Variant(clips, model="speech2gesture"),
+        OURS: Variant(clips),
+    }
+
+
+#: By name of the table: title, rows, claims, the paper's figures.
+TABLES = {
+    "table1_3d": (
+        "Table 1, 3D",
+        _rows(128),
+        (
+            Claim("without GAN, position L1 is about ours or lower", WITHOUT_GAN, OURS, "position_l1", -1),
+            Claim("the GAN worsens position L1", WITH_GAN, WITHOUT_GAN, "position_l1", 1),
+            Claim("the GAN lowers PCK", WITH_GAN, WITHOUT_GAN, "pck", -1),
+            Claim("ours is the more diverse (beside S2G without GAN)", OURS, WITHOUT_GAN, "diversity", 1),
+            Claim("ours is multimodal, Speech2Gesture is not", OURS, WITHOUT_GAN, "multimodality", 1),
+        ),
+        {
+            "S2G w/o GAN": "position L1 7.71, PCK 0.82, diversity 5.99",
+            "S2G": "24.68, 0.39, 2.46",
+            "StyleGestures": "18.97 (18.07), 0.34, 2.34, multimodality 7.55",
+            "Audio2Gestures": "7.84 (7.65), 0.82 (0.83), 6.32, multimodality 4.11",
+        },
+    ),
+    "table1_2d": (
+        "Table 1, 2D",
+        _rows(64),
+        (
+            Claim("without GAN, position L1 is the lowest", WITHOUT_GAN, OURS, "position_l1", -1),
+            Claim("without GAN, diversity is the lowest", WITHOUT_GAN, OURS, "diversity", -1),
+            Claim("the GAN worsens position L1", WITH_GAN, WITHOUT_GAN, "position_l1", 1),
+            Claim("the GAN raises diversity", WITH_GAN, WITHOUT_GAN, "diversity", 1),
+            Claim("ours is multimodal, Speech2Gesture is not", OURS, WITHOUT_GAN, "multimodality", 1),
+        ),
+        {
+            "S2G w/o GAN": "position L1 0.74, PCK 0.37, diversity 0.61",
+            "S2G": "1.08, 0.23, 0.89",
+            "Audio2Gestures": "0.94 (0.92), 0.33 (0.34), 0.84, multimodality 0.77",
+        },
+    ),
+}
+
+
+def main() -> None:
+    """Train and score what is missing, and draw both tables."""
+    parser = arguments("Table 1: comparison with Speech2Gesture, in 3D and 2D")
+    parser.add_argument("--corpus-2d", type=Path, help="made by 'a2g prepare talker --view s2g'")
+    parser.add_argument("--features-2d", type=Path, help="a run of motion_autoencoder on it")
+    options = parser.parse_args()
+    where = setting(options)
+    given = {
+        "table1_3d": where,
+        "table1_2d": replace(where, corpus=options.corpus_2d, features=options.features_2d),
+    }
+    only = options.only.split(",") if options.only else None
+    for name, (title, rows, claims, paper) in TABLES.items():
+        if given[name].corpus is not None:
+            compute(name, rows, given[name], only)
+        draw(name, title, rows, claims, paper)
+
+
+if __name__ == "__main__":
+    main()
