@@ -1,0 +1,158 @@
+"""K steps of actnorm, invertible convolution and affine coupling, one after another (MoGlow, Sec. 3)."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Key
+
+from a2g_jax.nn.flow.actnorm import actnorm, actnorm_inverse, actnorm_log_det, fit_actnorm, init_actnorm
+from a2g_jax.nn.flow.coupling import (
+    Shape,
+    States,
+    coupling,
+    coupling_inverse,
+    coupling_inverse_step,
+    init_coupling,
+    project_known,
+    start_states,
+)
+from a2g_jax.nn.flow.invertible import (
+    init_invertible,
+    inverse_weight,
+    invertible,
+    invertible_inverse,
+    invertible_log_det,
+)
+
+#: ``{"actnorm": ..., "invertible": ..., "coupling": ...}``, every array with a leading axis of K steps.
+Params = dict[str, Any]
+
+
+def init_glow(key: Key[Array, ""], shape: Shape, steps: int) -> Params:
+    """Of K steps; :func:`fit_glow` sets the actnorms from data."""
+
+    def one(step_key: Key[Array, ""]) -> Params:
+        keys = jax.random.split(step_key)
+        return {
+            "actnorm": init_actnorm(shape.channels),
+            "invertible": init_invertible(keys[0], shape.channels),
+            "coupling": init_coupling(keys[1], shape),
+        }
+
+    return jax.vmap(one)(jax.random.split(key, steps))
+
+
+def fit_glow(
+    params: Params,
+    shape: Shape,
+    x: Float[Array, "B T C"],
+    history: Float[Array, "B T H"],
+    known: Float[Array, "B T D"],
+) -> Params:
+    """Every step's actnorm set so that what reaches it comes out with mean 0 and standard deviation 1."""
+
+    def step(x, one):
+        fitted = fit_actnorm(x)
+        x = invertible(one["invertible"], actnorm(fitted, x))
+        return coupling(one["coupling"], shape, x, history, known)[0], fitted
+
+    _, fitted = jax.lax.scan(step, x, params)
+    return {**params, "actnorm": fitted}
+
+
+def glow(
+    params: Params,
+    shape: Shape,
+    x: Float[Array, "B T C"],
+    history: Float[Array, "B T H"],
+    known: Float[Array, "B T D"],
+) -> tuple[Float[Array, "B T C"], Float[Array, "B T"]]:
+    """Latents of a motion, and the log-determinant of every frame.
+
+    Args:
+        x: the motion.
+        history: what of the poses before each frame is known to it.
+        known: what else is known to it.
+    """
+
+    def step(carried, one):
+        x, log_det = carried
+        x = invertible(one["invertible"], actnorm(one["actnorm"], x))
+        x, more = coupling(one["coupling"], shape, x, history, known)
+        return (x, log_det + more + actnorm_log_det(one["actnorm"]) + invertible_log_det(one["invertible"])), None
+
+    (z, log_det), _ = jax.lax.scan(step, (x, jnp.zeros(x.shape[:2], x.dtype)), params)
+    return z, log_det
+
+
+def glow_inverse(
+    params: Params,
+    shape: Shape,
+    z: Float[Array, "B T C"],
+    history: Float[Array, "B T H"],
+    known: Float[Array, "B T D"],
+) -> Float[Array, "B T C"]:
+    """The motion of latents, for all frames at once, since the history is given (teacher forcing)."""
+
+    def step(x, one):
+        x = coupling_inverse(one["coupling"], shape, x, history, known)
+        return actnorm_inverse(one["actnorm"], invertible_inverse(one["invertible"], x)), None
+
+    x, _ = jax.lax.scan(step, z, params, reverse=True)
+    return x
+
+
+class Prepared(NamedTuple):
+    """A flow ready to sample frame by frame: per step, what need not be computed for every frame."""
+
+    couplings: tuple[Any, ...]
+    matrices: tuple[Array, ...]
+    """Inverse of the convolution and of the scale of the actnorm in one, transposed."""
+    biases: tuple[Array, ...]
+    """Of the actnorms."""
+
+
+def prepare(params: Params) -> Prepared:
+    """Inverse matrices once, and the steps apart: a scan over them would copy every weight for every frame."""
+    steps = len(params["actnorm"]["bias"])
+    apart = [jax.tree.map(lambda array, k=k: array[k], params) for k in range(steps)]
+    return Prepared(
+        tuple(one["coupling"] for one in apart),
+        tuple(inverse_weight(one["invertible"]).T * jnp.exp(-one["actnorm"]["log_scale"])[None] for one in apart),
+        tuple(one["actnorm"]["bias"] for one in apart),
+    )
+
+
+def project(prepared: Prepared, known: Float[Array, "*S D"]) -> tuple[Array, ...]:
+    """For every step, its :func:`a2g_jax.nn.flow.coupling.project_known`."""
+    return tuple(project_known(one, known) for one in prepared.couplings)
+
+
+def first_states(prepared: Prepared, shape: Shape, count: int, dtype: Any = jnp.float32) -> tuple[States, ...]:
+    """Zero states of every step for so many sequences."""
+    return tuple(start_states(shape, count, dtype) for _ in prepared.couplings)
+
+
+def glow_inverse_step(
+    prepared: Prepared,
+    shape: Shape,
+    z: Float[Array, "B C"],
+    history: Float[Array, "B H"],
+    projected: tuple[Array, ...],
+    states: tuple[States, ...],
+) -> tuple[Float[Array, "B C"], tuple[States, ...]]:
+    """:func:`glow_inverse` of one frame.
+
+    Args:
+        projected: of :func:`project`, this frame's (B, gates) for every step.
+        states: after the frame before.
+    """
+    x, after = z, []
+    for one, matrix, bias, known, state in reversed(
+        list(zip(prepared.couplings, prepared.matrices, prepared.biases, projected, states, strict=True))
+    ):
+        x, state = coupling_inverse_step(one, shape, x, history, known, state)
+        x = x @ matrix - bias[None]
+        after.append(state)
+    return x, tuple(reversed(after))

@@ -1,0 +1,240 @@
+"""Flow layers: inverses, log-determinants against autodiff, densities, and sampling frame by frame."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+from scipy import integrate, stats
+
+from a2g_jax.nn.flow.actnorm import actnorm, actnorm_inverse, actnorm_log_det, fit_actnorm, init_actnorm
+from a2g_jax.nn.flow.coupling import Shape, coupling, init_coupling
+from a2g_jax.nn.flow.glow import (
+    first_states,
+    fit_glow,
+    glow,
+    glow_inverse,
+    glow_inverse_step,
+    init_glow,
+    prepare,
+    project,
+)
+from a2g_jax.nn.flow.invertible import (
+    FIXED,
+    init_invertible,
+    inverse_weight,
+    invertible,
+    invertible_log_det,
+    weight,
+)
+from a2g_jax.nn.flow.priors import log_prob, spread
+
+KEY = jax.random.key(0)
+CELLS = ("gru", "lstm")
+
+
+def shape_of(cell="gru", channels=5, hidden=6, exact=False):
+    return Shape(channels, history=7, known=4, hidden=hidden, layers=2, cell=cell, exact=exact)
+
+
+def clips(shape, count=2, frames=9, dtype=jnp.float32, seed=1):
+    keys = jax.random.split(jax.random.key(seed), 3)
+    sizes = (shape.channels, shape.history, shape.known)
+    return tuple(jax.random.normal(key, (count, frames, size), dtype) for key, size in zip(keys, sizes, strict=True))
+
+
+def trained(params, scale=0.3, seed=2):
+    """Weights as far from their start as training takes them; what is fixed stays."""
+    leaves, tree = jax.tree_util.tree_flatten_with_path(params)
+    keys = jax.random.split(jax.random.key(seed), len(leaves))
+    moved = [
+        leaf
+        if any(getattr(part, "key", None) in FIXED for part in path)
+        else leaf + scale * jax.random.normal(key, leaf.shape, leaf.dtype)
+        for key, (path, leaf) in zip(keys, leaves, strict=True)
+    ]
+    return jax.tree_util.tree_unflatten(tree, moved)
+
+
+@pytest.fixture
+def double():
+    with jax.enable_x64(True):
+        yield
+
+
+def as_double(tree):
+    return jax.tree.map(lambda a: a.astype(jnp.float64), tree)
+
+
+class TestActnorm:
+    def test_fitted_it_standardises(self):
+        x = 3.0 + 5.0 * jax.random.normal(KEY, (4, 50, 3))
+        y = actnorm(fit_actnorm(x), x)
+        np.testing.assert_allclose(y.mean(axis=(0, 1)), 0, atol=1e-5)
+        np.testing.assert_allclose(y.std(axis=(0, 1)), 1, atol=1e-5)
+        np.testing.assert_allclose(actnorm_inverse(fit_actnorm(x), y), x, atol=1e-4)
+
+    def test_is_the_identity_before(self):
+        x = jax.random.normal(KEY, (4, 3))
+        np.testing.assert_array_equal(actnorm(init_actnorm(3), x), x)
+
+    def test_log_determinant(self):
+        params = trained(init_actnorm(4))
+        jacobian = jax.jacfwd(partial(actnorm, params))(jnp.arange(4.0))
+        np.testing.assert_allclose(actnorm_log_det(params), np.linalg.slogdet(jacobian)[1], rtol=1e-5)
+
+
+class TestInvertible:
+    def test_starts_as_a_rotation(self):
+        w = weight(init_invertible(KEY, 6))
+        np.testing.assert_allclose(w @ w.T, np.eye(6), atol=1e-5)
+
+    @pytest.mark.parametrize("channels", [1, 2, 7])
+    def test_inverse_and_log_determinant(self, channels):
+        params = trained(init_invertible(KEY, channels))
+        np.testing.assert_allclose(inverse_weight(params), np.linalg.inv(weight(params)), rtol=1e-3, atol=1e-4)
+        expected = np.linalg.slogdet(weight(params))[1]
+        np.testing.assert_allclose(invertible_log_det(params), expected, rtol=1e-4, atol=1e-5)
+
+    def test_what_is_fixed_has_no_gradient(self):
+        gradient = jax.grad(lambda p: invertible(p, jnp.ones((2, 5))).sum())(init_invertible(KEY, 5))
+        for name, values in gradient.items():
+            assert np.any(values != 0) == (name not in FIXED), name
+
+
+class TestCoupling:
+    @pytest.mark.parametrize("cell", CELLS)
+    def test_at_first_scales_by_the_same_amount(self, cell):
+        shape = shape_of(cell)
+        x, history, known = clips(shape)
+        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, known)
+        np.testing.assert_array_equal(y[..., :2], x[..., :2])
+        np.testing.assert_allclose(y[..., 2:], 0.880798 * x[..., 2:], rtol=1e-5)
+        np.testing.assert_allclose(log_det, 3 * np.log(0.880798), rtol=1e-4)
+
+    def test_exact_is_the_identity_at_first(self):
+        shape = shape_of(exact=True)
+        x, history, known = clips(shape)
+        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, known)
+        np.testing.assert_allclose(y, x, atol=1e-6)
+        np.testing.assert_allclose(log_det, 0, atol=1e-6)
+
+
+class TestGlow:
+    @pytest.mark.parametrize("cell", CELLS)
+    @pytest.mark.parametrize("state", ["at first", "fitted", "trained"])
+    def test_sixteen_steps_invert_in_single(self, cell, state):
+        shape = shape_of(cell, channels=9)
+        x, history, known = clips(shape, frames=20)
+        params = self.params(shape, 16, state, x, history, known)
+        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, known)
+        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        np.testing.assert_allclose(back, x, atol=1e-4)
+
+    @pytest.mark.parametrize("state", ["at first", "trained"])
+    def test_sixteen_steps_invert_in_double(self, double, state):
+        shape = shape_of(channels=9)
+        x, history, known = as_double(clips(shape, frames=20))
+        params = as_double(self.params(shape, 16, state, x, history, known))
+        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, known)
+        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        np.testing.assert_allclose(back, x, atol=1e-10)
+
+    @pytest.mark.parametrize("cell", CELLS)
+    def test_log_determinant_is_that_of_the_jacobian(self, double, cell):
+        shape = shape_of(cell, channels=4)
+        x, history, known = as_double(clips(shape, count=1, frames=5))
+        params = trained(as_double(init_glow(KEY, shape, 3)))
+        _, log_det = glow(params, shape, x, history, known)
+        # jacrev: the recurrent layers have no forward-mode derivative.
+        latents = lambda v: glow(params, shape, v.reshape(x.shape), history, known)[0].ravel()  # noqa: E731
+        jacobian = jax.jit(jax.jacrev(latents))(x.ravel())
+        np.testing.assert_allclose(log_det.sum(), np.linalg.slogdet(jacobian)[1], rtol=1e-8)
+
+    def test_later_frames_do_not_reach_back(self):
+        shape = shape_of()
+        x, history, known = clips(shape)
+        params = trained(init_glow(KEY, shape, 2))
+        run = jax.jit(glow, static_argnums=1)
+        z, log_det = run(params, shape, x, history, known)
+        other, other_log_det = run(params, shape, x.at[:, 5:].add(1.0), history, known)
+        np.testing.assert_array_equal(other[:, :5], z[:, :5])
+        np.testing.assert_array_equal(other_log_det[:, :5], log_det[:, :5])
+
+    @pytest.mark.parametrize("cell", CELLS)
+    def test_frame_by_frame_is_the_same(self, cell):
+        shape = shape_of(cell)
+        z, history, known = clips(shape)
+        params = trained(init_glow(KEY, shape, 4))
+        expected = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        prepared = prepare(params)
+        projected = project(prepared, known)
+
+        def step(states, frame):
+            x, states = glow_inverse_step(prepared, shape, *frame, states)
+            return states, x
+
+        frames = jax.tree.map(lambda a: jnp.swapaxes(a, 0, 1), (z, history, projected))
+        _, x = jax.jit(partial(jax.lax.scan, step))(first_states(prepared, shape, len(z)), frames)
+        np.testing.assert_allclose(jnp.swapaxes(x, 0, 1), expected, atol=2e-5)
+
+    def test_fitted_latents_are_standardised_by_every_actnorm(self):
+        shape = shape_of(exact=True)
+        x, history, known = clips(shape, count=8, frames=40)
+        params = fit_glow(init_glow(KEY, shape, 3), shape, 4.0 * x + 2.0, history, known)
+        z, _ = glow(params, shape, 4.0 * x + 2.0, history, known)
+        # Rotations of standardised channels: their overall mean square is one.
+        np.testing.assert_allclose(jnp.mean(jnp.square(z)), 1.0, atol=0.02)
+
+    @pytest.mark.parametrize("freedom", [0.0, 5.0])
+    def test_gradient_of_the_likelihood(self, double, freedom):
+        shape = shape_of(channels=3, hidden=3)
+        x, history, known = as_double(clips(shape, count=1, frames=3))
+        params = trained(as_double(init_glow(KEY, shape, 2)), 0.1)
+        free = {name: params[name] for name in ("actnorm", "coupling")}
+
+        @jax.jit
+        def loss(free, x):
+            z, log_det = glow({**params, **free}, shape, x, history, known)
+            return -jnp.mean(log_prob(z, freedom) + log_det)
+
+        check_grads(loss, (free, x), order=1, modes=["rev"], eps=1e-6, atol=1e-6, rtol=1e-6)
+
+    @staticmethod
+    def params(shape, steps, state, x, history, known):
+        params = init_glow(KEY, shape, steps)
+        if state == "fitted":
+            return fit_glow(params, shape, x, history, known)
+        return trained(params, 0.1) if state == "trained" else params
+
+
+class TestPriors:
+    def test_student_is_scipys(self):
+        z = np.random.default_rng(0).normal(size=(6, 4))
+        expected = stats.multivariate_t(np.zeros(4), np.eye(4), df=7).logpdf(z)
+        np.testing.assert_allclose(log_prob(jnp.asarray(z), 7.0), expected, rtol=1e-4)
+
+    def test_normal_is_scipys(self):
+        z = np.random.default_rng(0).normal(size=(6, 4))
+        expected = stats.multivariate_normal(np.zeros(4)).logpdf(z)
+        np.testing.assert_allclose(log_prob(jnp.asarray(z)), expected, rtol=1e-4)
+
+    def test_draws_of_student_have_its_radius(self):
+        z = spread(jax.random.normal(KEY, (20000, 3)), jax.random.key(1), 5.0)
+        # |z|^2 / C is F-distributed.
+        assert stats.kstest(np.sum(np.square(z), axis=-1) / 3, stats.f(3, 5).cdf).pvalue > 0.01
+
+    @pytest.mark.parametrize("freedom", [0.0, 50.0])
+    def test_the_density_of_a_flow_integrates_to_one(self, double, freedom):
+        shape = shape_of(channels=2)
+        _, history, known = as_double(clips(shape, count=1, frames=1))
+        params = trained(as_double(init_glow(KEY, shape, 3)))
+        grid = jnp.linspace(-40, 40, 1201)
+        points = jnp.stack(jnp.meshgrid(grid, grid), axis=-1).reshape(-1, 1, 2)
+        repeat = lambda a: jnp.broadcast_to(a, (len(points), *a.shape[1:]))  # noqa: E731
+        z, log_det = jax.jit(glow, static_argnums=1)(params, shape, points, repeat(history), repeat(known))
+        density = np.exp(np.asarray(log_prob(z, freedom) + log_det)).reshape(1201, 1201)
+        mass = integrate.trapezoid(integrate.trapezoid(density, grid), grid)
+        np.testing.assert_allclose(mass, 1.0, atol=2e-3)
