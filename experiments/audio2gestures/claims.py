@@ -49,7 +49,11 @@ def page() -> str:
     """Markdown."""
     steps = max((record["steps"] for record in records("table2") if record["variant"] == FULL), default=0)
     truth = next(
-        (record["scores"]["multimodality"]["mean"] for record in records("table2") if record["variant"] == "another right motion"),
+        (
+            record["scores"]["multimodality"]["mean"]
+            for record in records("table2")
+            if record["variant"] == "another right motion"
+        ),
         None,
     )
     lines = [f"# What the method does on the generated corpus ({steps} steps a run)", "", "## Multimodality, cm", ""]

@@ -12,12 +12,12 @@ recordings stay where ``--runs`` puts them.
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.audio2gestures.common import Claim, Variant, arguments, setting
+from experiments.audio2gestures.common import BASE, Claim, Variant, arguments, setting
 from experiments.audio2gestures.tables import compute, draw
 
 VARIANTS = {
-    "Audio2Gestures without split": Variant({"split": False, "sample_codes": True}),
-    "Audio2Gestures": Variant({}),
+    "Audio2Gestures without split": Variant({**BASE, "split": False, "sample_codes": True}),
+    "Audio2Gestures": Variant(BASE),
     "Speech2Gesture without GAN": Variant({"adversarial_weight": 0.0}, model="speech2gesture"),
 }
 

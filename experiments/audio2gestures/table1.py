@@ -10,7 +10,7 @@ the tables are drawn from the records that there are.
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.audio2gestures.common import Claim, Variant, arguments, setting
+from experiments.audio2gestures.common import BASE, Claim, Variant, arguments, setting
 from experiments.audio2gestures.tables import compute, draw
 
 OURS, WITHOUT_GAN, WITH_GAN = "Audio2Gestures", "Speech2Gesture without GAN", "Speech2Gesture"
@@ -21,7 +21,7 @@ def _rows(clip_frames: int) -> dict[str, Variant]:
     return {
         WITHOUT_GAN: Variant({**clips, "adversarial_weight": 0.0}, model="speech2gesture"),
         WITH_GAN: Variant(clips, model="speech2gesture"),
-        OURS: Variant(clips),
+        OURS: Variant({**BASE, **clips}),
     }
 
 

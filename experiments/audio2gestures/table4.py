@@ -5,17 +5,17 @@
 The paper does not give the losses' weights. Ours make each about as large as the position loss early in training.
 """
 
-from experiments.audio2gestures.common import Claim, Variant
+from experiments.audio2gestures.common import BASE, Claim, Variant
 from experiments.audio2gestures.tables import make
 
 STFT, SSIM, LPIPS = {"stft_weight": 0.05}, {"ssim_weight": 0.1}, {"lpips_weight": 0.002}
 
 VARIANTS = {
-    "A2G": Variant({}),
-    "+ STFT": Variant(STFT),
-    "+ SSIM": Variant(SSIM),
-    "+ LPIPS": Variant(LPIPS),
-    "+ STFT + SSIM + LPIPS": Variant({**STFT, **SSIM, **LPIPS}),
+    "A2G": Variant(BASE),
+    "+ STFT": Variant({**BASE, **STFT}),
+    "+ SSIM": Variant({**BASE, **SSIM}),
+    "+ LPIPS": Variant({**BASE, **LPIPS}),
+    "+ STFT + SSIM + LPIPS": Variant({**BASE, **STFT, **SSIM, **LPIPS}),
 }
 
 CLAIMS = (

@@ -5,14 +5,14 @@
 The paper trains the Transformer on sequences of 512 frames; here all rows have the same clips of 128.
 """
 
-from experiments.audio2gestures.common import Claim, Variant
+from experiments.audio2gestures.common import BASE, Claim, Variant
 from experiments.audio2gestures.tables import make
 
 VARIANTS = {
-    "baseline (TCN, no split)": Variant({"split": False, "sample_codes": True}),
-    "A2G (TCN)": Variant({}),
-    "A2G (GRU)": Variant({"backbone": "gru"}),
-    "A2G (Transformer)": Variant({"backbone": "transformer"}),
+    "baseline (TCN, no split)": Variant({**BASE, "split": False, "sample_codes": True}),
+    "A2G (TCN)": Variant(BASE),
+    "A2G (GRU)": Variant({**BASE, "backbone": "gru"}),
+    "A2G (Transformer)": Variant({**BASE, "backbone": "transformer"}),
 }
 
 CLAIMS = (

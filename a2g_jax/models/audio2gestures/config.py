@@ -86,10 +86,11 @@ class Audio2GesturesConfig:
     """Steps over which the diversity weight falls linearly to zero; 0 for never."""
 
     noise_frames: int = 1
-    """Frames between draws of the noise that the mapping net is given; 1 for noise without memory, as in the papers.
+    """In generation, frames between draws of the noise that the mapping net is given; 1 for noise without memory, as
+    in the papers and in training.
 
-    Such noise says at once everything about a clip and nothing about what changes within it, because the decoder
-    averages it away. Noise that changes every half second makes samples differ in what they do next as well.
+    The decoder averages noise without memory away; noise that changes every second makes samples differ more in what
+    they do next, and calmer. Trained with, it makes them differ less.
     """
     redraw_frames: int = 0
     """In generation, frames after which the motion-specific code's statistics are drawn anew, with linear blending.

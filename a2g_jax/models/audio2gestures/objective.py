@@ -13,7 +13,6 @@ from a2g_jax.models.audio2gestures import losses
 from a2g_jax.models.audio2gestures.codec import Networks
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.base import Batch, Params
-from a2g_jax.nn.noise import slow_normal
 
 Terms = dict[str, Array]
 
@@ -70,23 +69,11 @@ def total(terms: Terms, weighted: dict[str, Any]) -> Float[Array, ""]:
     return sum((weighted[name] * terms[name] for name in used), start=jnp.zeros(()))
 
 
-def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"], period: int = 1) -> Float[Array, "B T C"]:
-    """Noise with the mean and standard deviation over time of each clip's own specific code (Sec. 4.2.4).
-
-    Args:
-        period: frames between draws; 1 for noise that is independent from frame to frame.
-    """
+def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
+    """Noise with the mean and standard deviation over time of each clip's own specific code (Sec. 4.2.4)."""
     code = jax.lax.stop_gradient(code)
     mean, std = jnp.mean(code, axis=1, keepdims=True), jnp.std(code, axis=1, keepdims=True)
-    if period == 1:
-        return mean + std * jax.random.normal(key, code.shape, code.dtype)
-
-    def of_clip(clip_key):
-        phase_key, noise_key = jax.random.split(clip_key)
-        phase = jax.random.randint(phase_key, (), 0, period)
-        return slow_normal(noise_key, phase, *code.shape[1:], period)
-
-    return mean + std * jax.vmap(of_clip)(jax.random.split(key, len(code))).astype(code.dtype)
+    return mean + std * jax.random.normal(key, code.shape, code.dtype)
 
 
 def terms(networks: Networks, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
@@ -110,7 +97,7 @@ def _split_terms(networks: Networks, params: Params, key: Key[Array, ""], batch:
     # Two random specific codes for every clip, mapped in one call.
     kl_specific = losses.kl_loss(motion_specific)
     if config.mapping:
-        noise = jnp.concatenate([code_noise(key, i_motion, config.noise_frames) for key in keys[3:5]])
+        noise = jnp.concatenate([code_noise(keys[3], i_motion), code_noise(keys[4], i_motion)])
         mapped = networks.map_noise(params, noise)
         i_random = networks.to_time(mapped.sample(keys[5]))
         kl_specific = kl_specific + losses.kl_loss(mapped)
