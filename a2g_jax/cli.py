@@ -13,7 +13,7 @@ from a2g_jax.generation import retarget_arguments as retargeting
 from a2g_jax.inspection import arguments as inspection
 
 #: Names of the models; the registry itself is imported late, because it costs seconds.
-MODEL_NAMES = ("audio2gestures", "speech2gesture", "motion_autoencoder", "emotion_classifier")
+MODEL_NAMES = ("audio2gestures", "speech2gesture", "stylized_flow", "motion_autoencoder", "emotion_classifier")
 #: What can be prepared; the readers themselves are imported late for the same reason.
 READERS = (
     *("talker", "folder", "trinity", "genea2022", "genea2023", "beat", "beat2", "zeroeggs"),

@@ -51,6 +51,17 @@ class Generator:
             return _valid(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW), representation)
 
         self._sample = sample
+        self._begin = None if model.begin is None else jax.jit(model.begin)
+        proceed = model.proceed
+
+        @jax.jit
+        def go_on(params, summary, key, condition, start, carried):
+            assert proceed is not None
+            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self._halo, WINDOW), condition)
+            pose, carried = proceed(params, summary, key, cut, start + self._halo, carried)
+            return _valid(pose, representation), carried
+
+        self._go_on = go_on
 
     def frames(self, audio: Float[np.ndarray, " N"]) -> int:
         """Length of the motion for an audio: its seconds times fps, rounded."""
@@ -112,9 +123,20 @@ class Generator:
         windows = list(self._windows(features))
         key = jax.random.key(seed)
         for number in range(samples):
-            draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
-            parts = [draw(condition, jnp.int32(start)) for start, condition in windows]
+            sample_key = jax.random.fold_in(key, number)
+            parts = list(self._parts(windows, sample_key))
             yield np.concatenate([np.asarray(part) for part in parts])[:frames]
+
+    def _parts(self, windows, key):
+        """The motion of each window: on their own, or each going on from the one before."""
+        if self._begin is None:
+            draw = partial(self._sample, self._params, self._summary, key)
+            yield from (draw(condition, jnp.int32(start)) for start, condition in windows)
+            return
+        carried = self._begin(self._params, self._summary, key)
+        for start, condition in windows:
+            pose, carried = self._go_on(self._params, self._summary, key, condition, jnp.int32(start), carried)
+            yield pose
 
     def _windows(self, features: Float[np.ndarray, "T bands"]):
         """First frame (context included) and encoded audio of each window."""

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from a2g_jax.data.representation import WIDTHS
 from a2g_jax.errors import InputError
-from a2g_jax.models import audio2gestures, emotion_classifier, motion_autoencoder, speech2gesture
+from a2g_jax.models import audio2gestures, emotion_classifier, motion_autoencoder, speech2gesture, stylized_flow
 from a2g_jax.models.base import Data, Model
 
 
@@ -29,6 +29,7 @@ MODELS: dict[str, Entry] = {
     "speech2gesture": Entry(
         speech2gesture.Speech2GestureConfig, speech2gesture.PRESETS, speech2gesture.build, tuple(WIDTHS)
     ),
+    "stylized_flow": Entry(stylized_flow.StylizedFlowConfig, stylized_flow.PRESETS, stylized_flow.build, tuple(WIDTHS)),
     "motion_autoencoder": Entry(
         motion_autoencoder.MotionAutoencoderConfig, motion_autoencoder.PRESETS, motion_autoencoder.build, tuple(WIDTHS)
     ),

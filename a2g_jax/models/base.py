@@ -84,3 +84,12 @@ class Model(NamedTuple):
     """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""
     validation_loss: Callable[..., tuple[Array, dict[str, Array]]] | None = None
     """``loss`` as it is taken on held-out clips, where that differs (no dropout)."""
+    warm_start: Callable[..., Params] | None = None
+    """``warm_start(params, batch) -> params``, once, with the first batch of a training: initialisation from data."""
+    begin: Callable[..., Any] | None = None
+    """Of models whose frames depend on those before: ``begin(params, summary, key) -> carried``, before frame 0."""
+    proceed: Callable[..., tuple[Array, Any]] | None = None
+    """``proceed(params, summary, key, condition, start, carried) -> (pose (T, R, D), carried)``: the next T frames.
+
+    Such a model's condition has time as the leading axis of every array. ``sample`` is ``proceed`` after ``begin``.
+    """

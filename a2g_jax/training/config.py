@@ -16,11 +16,14 @@ class TrainConfig:
     learning_rate: float = 1e-4
     """Of Adam; the peak, if a schedule moves it."""
     schedule: str = "constant"
-    """'constant', or 'cosine': half a cosine down to a hundredth of the peak at the last step."""
+    """'constant'; 'cosine': half a cosine down to a hundredth of the peak at the last step; or 'noam': down with the root
+    of the step to a tenth of the peak."""
     warmup_steps: int = 0
     """Steps over which the learning rate rises linearly from zero."""
     clip_norm: float = 0.0
     """Gradients longer than this are scaled down to it; 0 for never."""
+    clip_value: float = 0.0
+    """Entries of gradients beyond this are cut off at it, before ``clip_norm``; 0 for never."""
     augmentation: float = 0.0
     """Strength of the random gain, equaliser and noise on audio features; 0 for none, 1 for a lot."""
     seed: int = 0
@@ -53,13 +56,13 @@ class TrainConfig:
         for name in counts:
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
-        for name in ("warmup_steps", "clip_norm", "augmentation", "device_megabytes"):
+        for name in ("warmup_steps", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
         if not 0 < self.learning_rate < float("inf"):
             raise InputError(f"--learning-rate: expected a number above 0; got {self.learning_rate}.")
-        if self.schedule not in ("constant", "cosine"):
-            raise InputError(f"--schedule: expected 'constant' or 'cosine'; got {self.schedule!r}.")
+        if self.schedule not in ("constant", "cosine", "noam"):
+            raise InputError(f"--schedule: expected 'constant', 'cosine' or 'noam'; got {self.schedule!r}.")
         if not 0 <= self.seed < 2**31:
             raise InputError(f"--seed: expected a whole number from 0 to 2147483647; got {self.seed}.")
 

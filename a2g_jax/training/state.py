@@ -30,6 +30,8 @@ Metrics = dict[str, Float[Array, ""]]
 
 def learning_rate(config: TrainConfig) -> optax.Schedule:
     """Learning rate as a function of the step."""
+    if config.schedule == "noam":
+        return _noam(config)
     if config.schedule == "constant":
         after = optax.constant_schedule(config.learning_rate)
     elif config.schedule == "cosine":
@@ -44,10 +46,24 @@ def learning_rate(config: TrainConfig) -> optax.Schedule:
     return optax.join_schedules([up, after], [config.warmup_steps])
 
 
+def _noam(config: TrainConfig) -> optax.Schedule:
+    """Linearly up to the learning rate over the warm-up, then down with the root of the step, to a tenth of it."""
+    warmup = max(1, config.warmup_steps)
+
+    def schedule(count):
+        number = jnp.asarray(count, jnp.float32) + 1.0
+        scale = jnp.sqrt(warmup) * jnp.minimum(number * warmup**-1.5, number**-0.5)
+        return config.learning_rate * jnp.where(number > warmup, jnp.maximum(scale, 0.1), scale)
+
+    return schedule
+
+
 def make_optimiser(config: TrainConfig) -> optax.GradientTransformation:
     """Adam with the schedule and clipping of the settings."""
     adam = optax.adam(learning_rate(config))
-    return optax.chain(optax.clip_by_global_norm(config.clip_norm), adam) if config.clip_norm > 0 else adam
+    clips = [optax.clip(config.clip_value)] if config.clip_value > 0 else []
+    clips += [optax.clip_by_global_norm(config.clip_norm)] if config.clip_norm > 0 else []
+    return optax.chain(*clips, adam) if clips else adam
 
 
 def init_state(model: Model, config: TrainConfig) -> TrainState:
@@ -71,11 +87,14 @@ def advance(
     A step whose loss or gradient is not finite changes no parameter; from then on ``good`` is false and no later step
     changes any, until the host notices and stops.
     """
-    (loss, terms), gradient = jax.value_and_grad(model.loss, has_aux=True)(state.params, key, batch, state.step)
+    params = state.params
+    if (warm_start := model.warm_start) is not None:
+        params = jax.lax.cond(state.step == 0, lambda p: warm_start(p, batch), lambda p: p, params)
+    (loss, terms), gradient = jax.value_and_grad(model.loss, has_aux=True)(params, key, batch, state.step)
     norm = optax.global_norm(gradient)
     good = state.good & jnp.isfinite(loss) & jnp.isfinite(norm)
-    updates, optimiser = make_optimiser(config).update(gradient, state.optimiser, state.params)
-    params = optax.apply_updates(state.params, updates)
+    updates, optimiser = make_optimiser(config).update(gradient, state.optimiser, params)
+    params = optax.apply_updates(params, updates)
     keep: Callable[[Array, Array], Array] = lambda new, old: jnp.where(good, new, old)  # noqa: E731
     params = jax.tree.map(keep, params, state.params)
     optimiser = jax.tree.map(keep, optimiser, state.optimiser)

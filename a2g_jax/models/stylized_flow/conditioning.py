@@ -1,0 +1,21 @@
+"""What a frame is told of: the poses before it and the audio around it."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Key
+
+
+def windows(x: Float[Array, "B T C"], frames: int) -> Float[Array, "B _ frames C"]:
+    """Every stretch of so many frames, oldest first; ``T - frames + 1`` of them."""
+    count = x.shape[1] - frames + 1
+    return jnp.stack([x[:, first : first + count] for first in range(frames)], axis=2)
+
+
+def pose_history(x: Float[Array, "B T C"], history: int, after: int) -> Float[Array, "B _ history C"]:
+    """The poses before each of the frames from ``history`` to ``T - after``."""
+    return windows(x[:, : x.shape[1] - 1 - after], history)
+
+
+def hidden(key: Key[Array, ""], share: float, shape: tuple[int, int, int]) -> Bool[Array, "B N history"]:
+    """Which told poses stay seen when that share of them is hidden."""
+    return jax.random.bernoulli(key, 1.0 - share, shape)

@@ -1,0 +1,102 @@
+"""Settings of the stylized flow and its presets."""
+
+from dataclasses import dataclass, fields
+
+from a2g_jax.errors import InputError
+
+
+@dataclass(frozen=True)
+class StylizedFlowConfig:
+    """Flow, global encoder and losses; the defaults are those of the paper on Trinity (Sec. 4)."""
+
+    flow_steps: int = 16
+    """Steps of actnorm, invertible convolution and coupling."""
+    hidden: int = 800
+    """Width of the recurrent layers in every coupling."""
+    layers: int = 2
+    """Recurrent layers in every coupling."""
+    cell: str = "gru"
+    """``gru`` (stylized flow) or ``lstm`` (MoGlow)."""
+    exact_identity: bool = False
+    """Whether couplings are the identity at first, as the paper says; the authors' scale by s(2) = 0.88."""
+    history_frames: int = 5
+    """Poses that a frame is told of; its audio reaches as far back."""
+    lookahead_frames: int = 20
+    """Frames of audio after its own that a frame is told of."""
+    frame_dropout: float = 0.4
+    """Share of the told poses that are hidden in training, so that the audio is listened to."""
+    freedom: float = 50.0
+    """Degrees of freedom of the Student-t prior; 0 for a normal one (MoGlow)."""
+    global_channels: int = 32
+    """Values of the global feature; 0 for no global encoder."""
+    encoder_channels: int = 256
+    """Of the convolutions of the global encoder."""
+    encoder_blocks: int = 5
+    """Residual blocks of each of its two networks."""
+    embedding_channels: int = 64
+    """Values that each of its two networks gives."""
+    reverse_share: float = 0.2
+    """Share of the batches that also take the reverse pass; every fifth in the authors' code."""
+    reconstruction_weight: float = 1.0
+    """Of the L1 distance of poses that the reverse pass makes; 0 for none."""
+    perceptual_weight: float = 0.0
+    """Of the gesture perceptual loss (Eq. 8), 0.1 in the paper; needs ``a2g train --features RUN``."""
+    clip_frames: int = 120
+    """Frames in a training clip; the first ``history_frames`` and the last ``lookahead_frames`` are only told of."""
+    temperature: float = 1.0
+    """In generation, scale of the latents; 1 is what training saw."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            *("flow_steps", "hidden", "layers", "history_frames", "encoder_channels"),
+            *("encoder_blocks", "embedding_channels"),
+        ):
+            if getattr(self, name) < 1:
+                raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
+        for name in ("lookahead_frames", "global_channels"):
+            if getattr(self, name) < 0:
+                raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
+        if self.cell not in ("gru", "lstm"):
+            raise InputError(f"--cell: expected gru or lstm; got {self.cell!r}.")
+        for name in ("frame_dropout", "reverse_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise InputError(f"--{name.replace('_', '-')}: expected 0 to 1; got {getattr(self, name)}.")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            bounded = field.name in ("freedom", "temperature") or field.name.endswith("_weight")
+            if bounded and not 0 <= value < float("inf"):
+                raise InputError(f"--{field.name.replace('_', '-')}: expected 0 or more; got {value}.")
+        if self.clip_frames <= self.history_frames + self.lookahead_frames:
+            raise InputError(
+                f"--clip-frames: expected more than --history-frames {self.history_frames} and --lookahead-frames"
+                f" {self.lookahead_frames} together; got {self.clip_frames}."
+            )
+
+    @property
+    def audio_frames(self) -> int:
+        """Frames of audio that a frame is told of."""
+        return self.history_frames + 1 + self.lookahead_frames
+
+    @property
+    def reverses(self) -> bool:
+        """Whether any batch takes the reverse pass."""
+        return self.reverse_share > 0 and (self.reconstruction_weight > 0 or self.perceptual_weight > 0)
+
+
+PRESETS: dict[str, StylizedFlowConfig] = {
+    "paper": StylizedFlowConfig(perceptual_weight=0.1),
+    "ted": StylizedFlowConfig(history_frames=12, lookahead_frames=0, clip_frames=42, perceptual_weight=0.1),
+    "moglow": StylizedFlowConfig(hidden=512, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0),
+    "tiny": StylizedFlowConfig(
+        flow_steps=8,
+        hidden=64,
+        layers=1,
+        history_frames=5,
+        lookahead_frames=10,
+        clip_frames=64,
+        global_channels=16,
+        encoder_channels=32,
+        encoder_blocks=1,
+        embedding_channels=16,
+    ),
+}

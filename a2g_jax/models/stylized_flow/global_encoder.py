@@ -1,0 +1,37 @@
+"""The global encoder (Sec. 3.4, Fig. 4): told poses and told audio become one feature of a frame."""
+
+from flax import linen as nn
+from jaxtyping import Array, Float
+
+from a2g_jax.nn.conv import Conv1D, Dense
+from a2g_jax.nn.strided import StridedConv1D
+
+
+class WindowEncoder(nn.Module):
+    """A TCN over the stretch that a frame is told of, averaged over time.
+
+    Layer normalisation takes the place of the authors' batch normalisation: it has no running statistics, and what a
+    frame's feature is does not depend on the batch.
+    """
+
+    channels: int
+    blocks: int
+    features: int
+
+    @nn.compact
+    def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B F"]:
+        x = StridedConv1D(self.channels)(x)
+        for _ in range(self.blocks):
+            x = nn.relu(x + nn.LayerNorm()(Conv1D(self.channels)(x)))
+        return StridedConv1D(self.features)(x).mean(axis=1)
+
+
+class Fusion(nn.Module):
+    """Fully connected layers from both embeddings to the global feature."""
+
+    hidden: int
+    features: int
+
+    @nn.compact
+    def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B T F"]:
+        return Dense(self.features)(nn.relu(Dense(self.hidden)(nn.relu(Dense(self.hidden)(x)))))

@@ -1,0 +1,195 @@
+"""The flow with its conditioning: latents of motions, motions of latents, and motions frame by frame."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Key
+
+from a2g_jax.models.base import Data, Params
+from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.global_encoder import Fusion, WindowEncoder
+from a2g_jax.nn.flow.coupling import Shape
+from a2g_jax.nn.flow.glow import (
+    Prepared,
+    first_states,
+    fit_glow,
+    glow,
+    glow_inverse,
+    glow_inverse_step,
+    init_glow,
+    prepare,
+    project,
+)
+
+
+class Told(NamedTuple):
+    """What N frames of each clip are told."""
+
+    history: Float[Array, "B N H"]
+    """Poses before them, and the global feature."""
+    known: Float[Array, "B N D"]
+    """Audio around them."""
+
+
+class Heard(NamedTuple):
+    """What of the conditioning no pose has a part in, for T frames: computed before the scan over frames."""
+
+    projected: tuple[Array, ...]
+    """For each step of the flow, (T, gates)."""
+    embedding: Float[Array, "T E"]
+    """Of the audio, for the global encoder; E is 0 without one."""
+
+
+class Carried(NamedTuple):
+    """What goes from frame to frame in sampling."""
+
+    history: Float[Array, "B history C"]
+    """Normalised poses, the oldest first."""
+    states: Any
+    """Of the recurrent layers."""
+
+
+class Networks:
+    """Pure functions of parameters; poses here are z-scores, flattened to C values."""
+
+    def __init__(self, config: StylizedFlowConfig, data: Data) -> None:
+        self.config, self.data = config, data
+        rows = data.pose_statistics.mean.shape
+        self.rows, self.channels = rows, rows[0] * rows[1]
+        self.shape = Shape(
+            self.channels,
+            config.history_frames * self.channels + config.global_channels,
+            config.audio_frames * data.audio_bands,
+            config.hidden,
+            config.layers,
+            config.cell,
+            config.exact_identity,
+        )
+        self._window = WindowEncoder(config.encoder_channels, config.encoder_blocks, config.embedding_channels)
+        self._fusion = Fusion(config.encoder_channels, config.global_channels)
+
+    def init(self, key: Key[Array, ""]) -> Params:
+        """Before the actnorms are fitted to data."""
+        config, keys = self.config, jax.random.split(key, 4)
+        params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
+        if config.global_channels:
+            both = jnp.zeros((1, 1, 2 * config.embedding_channels))
+            params["global_encoder"] = {
+                "pose": self._window.init(keys[1], jnp.zeros((1, config.history_frames, self.channels)))["params"],
+                "audio": self._window.init(keys[2], jnp.zeros((1, config.audio_frames, self.data.audio_bands)))[
+                    "params"
+                ],
+                "fusion": self._fusion.init(keys[3], both)["params"],
+            }
+        return params
+
+    def flat(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T C"]:
+        """Z-scores of poses."""
+        return self.data.pose_statistics.normalise(pose).reshape(*pose.shape[:2], -1)
+
+    def pose(self, flat: Float[Array, "B T C"]) -> Float[Array, "B T R D"]:
+        """Poses of z-scores."""
+        poses: Float[Array, "B T R D"] = self.data.pose_statistics.denormalise(
+            flat.reshape(*flat.shape[:2], *self.rows)
+        )
+        return poses
+
+    def told(
+        self,
+        params: Params,
+        audio: Float[Array, "B T bands"],
+        flat: Float[Array, "B T C"],
+        seen: Array | None = None,
+    ) -> Told:
+        """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
+
+        Args:
+            seen: which told poses are not hidden, (B, N, history); None for all.
+        """
+        config = self.config
+        history = pose_history(flat, config.history_frames, config.lookahead_frames)
+        if seen is not None:
+            history = history * seen[..., None]
+        heard = windows(audio, config.audio_frames)
+        poses = history.reshape(*history.shape[:2], -1)
+        if config.global_channels:
+            embedded = [self.embed(params, "pose", history), self.embed(params, "audio", heard)]
+            poses = jnp.concatenate([poses, self.fuse(params, *embedded)], axis=-1)
+        return Told(poses, heard.reshape(*heard.shape[:2], -1))
+
+    def embed(self, params: Params, name: str, stretches: Float[Array, "B N T C"]) -> Float[Array, "B N E"]:
+        """Embedding of each stretch by one of the two networks of the global encoder."""
+        flat = stretches.reshape(-1, *stretches.shape[2:])
+        embedding: Any = self._window.apply({"params": params["global_encoder"][name]}, flat)
+        return embedding.reshape(*stretches.shape[:2], -1)
+
+    def fuse(self, params: Params, pose: Float[Array, "B N E"], audio: Float[Array, "B N E"]) -> Float[Array, "B N G"]:
+        """The global feature."""
+        feature: Any = self._fusion.apply(
+            {"params": params["global_encoder"]["fusion"]}, jnp.concatenate([pose, audio], axis=-1)
+        )
+        return feature
+
+    def inner(self, x: Float[Array, "B T C"]) -> Float[Array, "B N C"]:
+        """The frames of a clip that are told of all they need."""
+        return x[:, self.config.history_frames : x.shape[1] - self.config.lookahead_frames]
+
+    def latents(
+        self, params: Params, x: Float[Array, "B N C"], told: Told
+    ) -> tuple[Float[Array, "B N C"], Float[Array, "B N"]]:
+        """Latents and log-determinants of frames."""
+        return glow(params["glow"], self.shape, x, told.history, told.known)
+
+    def motion(self, params: Params, z: Float[Array, "B N C"], told: Told) -> Float[Array, "B N C"]:
+        """Frames of latents, all at once, as the told poses are given."""
+        return glow_inverse(params["glow"], self.shape, z, told.history, told.known)
+
+    def fitted(self, params: Params, audio: Float[Array, "B T bands"], flat: Float[Array, "B T C"]) -> Params:
+        """Actnorms set from a batch."""
+        told = self.told(params, audio, flat)
+        return {**params, "glow": fit_glow(params["glow"], self.shape, self.inner(flat), told.history, told.known)}
+
+    def heard(self, params: Params, audio: Float[Array, "T bands"]) -> Heard:
+        """For every frame of an audio; before and after it there are zeros."""
+        config = self.config
+        padded = jnp.pad(audio, ((config.history_frames, config.lookahead_frames), (0, 0)))[None]
+        stretches = windows(padded, config.audio_frames)
+        known = stretches.reshape(len(audio), -1)
+        embedding = jnp.zeros((len(audio), 0))
+        if config.global_channels:
+            embedding = self.embed(params, "audio", stretches)[0]
+        return Heard(project(prepare(params["glow"]), known), embedding)
+
+    def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> Carried:
+        """Before the first frame of so many sequences.
+
+        Args:
+            seed: poses before it; the mean pose if None.
+        """
+        shape = (count, self.config.history_frames, self.channels)
+        history = jnp.zeros(shape) if seed is None else jnp.broadcast_to(seed[None], shape)
+        return Carried(history, first_states(prepare(params["glow"]), self.shape, count))
+
+    def proceed(
+        self, params: Params, z: Float[Array, "T B C"], heard: Heard, carried: Carried
+    ) -> tuple[Float[Array, "T B C"], Carried]:
+        """Frames of latents one after another, each told of those before it."""
+        prepared: Prepared = prepare(params["glow"])
+        count = z.shape[1]
+
+        def frame(carried: Carried, one):
+            latent, projected, embedding = one
+            history, states = carried
+            told = history.reshape(count, -1)
+            if self.config.global_channels:
+                audio = jnp.broadcast_to(embedding[None, None], (count, 1, embedding.shape[0]))
+                feature = self.fuse(params, self.embed(params, "pose", history[:, None]), audio)
+                told = jnp.concatenate([told, feature[:, 0]], axis=-1)
+            known = tuple(jnp.broadcast_to(share[None], (count, share.shape[0])) for share in projected)
+            x, states = glow_inverse_step(prepared, self.shape, latent, told, known, states)
+            return Carried(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), states), x
+
+        after, x = jax.lax.scan(frame, carried, (z, heard.projected, heard.embedding))
+        return x, after

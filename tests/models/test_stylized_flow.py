@@ -1,0 +1,154 @@
+"""The flow: likelihood, initialisation from data, sampling frame by frame, windows, settings."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from a2g_jax.data.poses import PoseLayout
+from a2g_jax.errors import InputError
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
+from a2g_jax.models.stylized_flow.model import draw_latents
+from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.training.config import TrainConfig
+from a2g_jax.training.state import advance, init_state, learning_rate
+
+SMALL = StylizedFlowConfig(
+    flow_steps=3,
+    hidden=8,
+    layers=1,
+    history_frames=3,
+    lookahead_frames=2,
+    clip_frames=24,
+    global_channels=4,
+    encoder_channels=8,
+    encoder_blocks=1,
+    embedding_channels=4,
+    reverse_share=1.0,
+)
+MOGLOW = replace(SMALL, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0)
+SHAPE = (2, 3)
+DATA = Data(
+    PoseLayout(("a", "b", "c"), ((0, 1), (1, 2))),
+    15.0,
+    4,
+    Statistics(np.full(SHAPE, 0.5, np.float32), np.full(SHAPE, 2.0, np.float32)),
+    "directions",
+)
+SETTINGS = TrainConfig(steps=200, learning_rate=3e-3, clip_value=5.0, clip_norm=100.0)
+
+
+def batch_of(clips=4, frames=24, seed=0):
+    """Slow poses that the audio has a part in."""
+    rng = np.random.default_rng(seed)
+    audio = rng.normal(size=(clips, frames, 4)).astype(np.float32)
+    pose = np.cumsum(0.3 * rng.normal(size=(clips, frames, *SHAPE)), axis=1) + audio[..., :1, None]
+    return Batch(jnp.asarray(audio), jnp.asarray(pose, jnp.float32))
+
+
+def trained(config, steps=60):
+    model = build(config, DATA)
+    state = init_state(model, SETTINGS)
+    step = jax.jit(lambda state, batch, key: advance(model, SETTINGS, state, batch, key))
+    history = []
+    for number in range(steps):
+        state, metrics = step(state, batch_of(seed=number % 5), jax.random.key(number))
+        history.append(float(metrics["bits_per_dim"]))
+    return model, state, history
+
+
+@pytest.mark.parametrize("config", [SMALL, MOGLOW], ids=["stylized flow", "moglow"])
+def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
+    model, state, history = trained(config)
+    assert bool(state.good)
+    assert np.mean(history[-5:]) < np.mean(history[:5]) - 0.1
+    networks = Networks(config, DATA)
+    audio = batch_of(clips=1, frames=128).audio[0]
+    key = jax.random.key(7)
+    heard = jax.jit(model.condition)(state.params, audio)
+    pose = jax.jit(model.sample)(state.params, {}, key, heard, jnp.int32(0))
+    assert pose.shape == (128, *SHAPE)
+    # Sampled frame by frame; encoded all at once, with the same poses before and the same silence around.
+    before, after = config.history_frames, config.lookahead_frames
+    flat = jnp.pad(networks.flat(pose[None]), ((0, 0), (before, after), (0, 0)))
+    around = jnp.pad(audio, ((before, after), (0, 0)))[None]
+    told = jax.jit(networks.told)(state.params, around, flat)
+    z, _ = jax.jit(networks.latents)(state.params, networks.inner(flat), told)
+    drawn = draw_latents(config, key, jnp.int32(0), 128, networks.channels)
+    np.testing.assert_allclose(z[0], drawn, atol=5e-3)
+
+
+def test_a_motion_in_two_parts_is_the_motion_in_one():
+    model = build(SMALL, DATA)
+    params = jax.jit(model.warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
+    key, audio = jax.random.key(3), batch_of(clips=1, frames=256).audio[0]
+    heard = jax.jit(model.condition)(params, audio)
+    whole = jax.jit(model.sample)(params, {}, key, heard, jnp.int32(0))
+    carried, parts = jax.jit(model.begin)(params, {}, key), []
+    proceed = jax.jit(model.proceed)
+    for start in (0, 128):
+        part = jax.tree.map(lambda array, first=start: array[first : first + 128], heard)
+        pose, carried = proceed(params, {}, key, part, jnp.int32(start), carried)
+        parts.append(pose)
+    np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)
+
+
+def test_the_first_step_fits_the_actnorms_and_no_other_does():
+    model = build(SMALL, DATA)
+    frozen = TrainConfig(steps=5, learning_rate=1e-12)
+    state = init_state(model, frozen)
+    fitted = jax.jit(model.warm_start)(state.params, batch_of(seed=1))
+    step = jax.jit(lambda state, batch: advance(model, frozen, state, batch, jax.random.key(0))[0])
+    state = step(state, batch_of(seed=1))
+    state = step(state, batch_of(seed=2))
+    for ours, theirs in zip(jax.tree.leaves(state.params), jax.tree.leaves(fitted), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-5)
+
+
+def test_told_poses_are_those_before_and_audio_those_around():
+    config = replace(SMALL, global_channels=0)
+    networks = Networks(config, DATA)
+    audio, flat = jnp.arange(24.0)[None, :, None] * jnp.ones((1, 1, 4)), jnp.arange(24.0)[None, :, None]
+    told = networks.told({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
+    assert told.history.shape == (1, 19, 18)
+    np.testing.assert_array_equal(told.history[0, 0].reshape(3, 6)[:, 0], [0, 1, 2])
+    np.testing.assert_array_equal(told.known[0, 0].reshape(6, 4)[:, 0], [0, 1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(networks.inner(flat)[0, :, 0], np.arange(3, 22))
+    np.testing.assert_array_equal(told.history[0, -1].reshape(3, 6)[:, 0], [18, 19, 20])
+
+
+def test_loss_has_the_terms_of_the_reverse_pass_only_where_it_is_taken():
+    params = jax.jit(build(SMALL, DATA).init)(jax.random.key(0))
+    terms = jax.jit(build(SMALL, DATA).loss)(params, jax.random.key(0), batch_of(), jnp.int32(1))[1]
+    assert terms["reconstruction"] > 0
+    never = build(replace(SMALL, reverse_share=0.0), DATA)
+    assert "reconstruction" not in jax.jit(never.loss)(params, jax.random.key(0), batch_of(), jnp.int32(1))[1]
+
+
+def test_noam_rises_falls_and_ends_at_a_tenth():
+    schedule = learning_rate(TrainConfig(steps=10, schedule="noam", warmup_steps=100, learning_rate=1.0))
+    np.testing.assert_allclose([schedule(n) for n in (0, 49, 99, 399, 10**6)], [0.01, 0.5, 1.0, 0.5, 0.1], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"cell": "rnn"}, "--cell"),
+        ({"history_frames": 0}, "--history-frames"),
+        ({"frame_dropout": 1.5}, "--frame-dropout"),
+        ({"clip_frames": 5}, "--clip-frames"),
+        ({"perceptual_weight": float("inf")}, "--perceptual-weight"),
+    ],
+)
+def test_wrong_settings_are_named(changes, named):
+    with pytest.raises(InputError, match=named):
+        replace(SMALL, **changes)
+
+
+def test_the_perceptual_loss_asks_for_its_network():
+    with pytest.raises(InputError, match="--features"):
+        build(PRESETS["paper"], DATA)
