@@ -16,8 +16,8 @@ class TrainConfig:
     learning_rate: float = 1e-4
     """Of Adam; the peak, if a schedule moves it."""
     schedule: str = "constant"
-    """'constant'; 'cosine': half a cosine down to a hundredth of the peak at the last step; or 'noam': down with the root
-    of the step to a tenth of the peak."""
+    """'constant'; 'cosine': half a cosine down to a hundredth of the peak at the last step; or 'noam': down with the
+    root of the step to a tenth of the peak."""
     warmup_steps: int = 0
     """Steps over which the learning rate rises linearly from zero."""
     clip_norm: float = 0.0
