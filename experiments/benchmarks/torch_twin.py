@@ -6,85 +6,26 @@ matrices come from plain Gram-Schmidt, without our fallback for degenerate vecto
 Submodules carry the names that Flax gives ours, so that parameters are copied and compared by name.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import conv1d
 
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
-from a2g_jax.models.audio2gestures.networks import LOG_VARIANCE_BOUND
-
-
-class Conv(nn.Module):
-    """Convolution over time with "same" zero padding; one tap makes it a linear layer for each frame."""
-
-    def __init__(self, inputs: int, outputs: int, taps: int = 1, dilation: int = 1) -> None:
-        super().__init__()
-        self.kernel = nn.Parameter(nn.init.xavier_uniform_(torch.empty(outputs, inputs, taps)))
-        self.bias = nn.Parameter(torch.zeros(outputs))
-        self.dilation = dilation
-        self.padding = dilation * (taps // 2)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return conv1d(x, self.kernel, self.bias, padding=self.padding, dilation=self.dilation)
-
-
-class ResidualBlock(nn.Module):
-    """Two dilated convolutions added to the input."""
-
-    def __init__(self, inputs: int, outputs: int, taps: int, dilation: int) -> None:
-        super().__init__()
-        self.Conv1D_0 = Conv(inputs, outputs, taps, dilation)
-        self.Conv1D_1 = Conv(outputs, outputs, taps, dilation)
-        self.Dense_0 = Conv(inputs, outputs) if inputs != outputs else nn.Identity()
-
-    def forward(self, x: Tensor) -> Tensor:
-        y = torch.relu(self.Conv1D_1(torch.relu(self.Conv1D_0(x))))
-        return torch.relu(self.Dense_0(x) + y)
-
-
-class TCN(nn.Module):
-    """Residual blocks, block i with dilation ``2 ** i``."""
-
-    def __init__(self, inputs: int, channels: tuple[int, ...], taps: int) -> None:
-        super().__init__()
-        widths = (inputs, *channels)
-        for block, (before, after) in enumerate(zip(widths, channels, strict=False)):
-            self.add_module(f"ResidualBlock_{block}", ResidualBlock(before, after, taps, 2**block))
-
-    def forward(self, x: Tensor) -> Tensor:
-        for block in self.children():
-            x = block(x)
-        return x
-
-
-class Gaussian(NamedTuple):
-    """Means and log-variances (clips, channels, frames)."""
-
-    mean: Tensor
-    log_variance: Tensor
-
-    def shift(self, noise: Tensor) -> Tensor:
-        """The draw that standard normal noise stands for."""
-        return self.mean + torch.exp(0.5 * self.log_variance) * noise
-
-
-class GaussianHead(nn.Module):
-    """Mean and bounded log-variance. Flax numbers the outer layer of each pair first."""
-
-    def __init__(self, inputs: int, hidden: int, outputs: int) -> None:
-        super().__init__()
-        self.Dense_0, self.Dense_1 = Conv(hidden, outputs), Conv(inputs, hidden)
-        self.Dense_2, self.Dense_3 = Conv(hidden, outputs), Conv(inputs, hidden)
-
-    def forward(self, x: Tensor) -> Gaussian:
-        mean = self.Dense_0(torch.relu(self.Dense_1(x)))
-        log_variance = self.Dense_2(torch.relu(self.Dense_3(x)))
-        return Gaussian(mean, LOG_VARIANCE_BOUND * torch.tanh(log_variance / LOG_VARIANCE_BOUND))
+from experiments.benchmarks.torch_layers import (
+    TCN,
+    Conv,
+    Gaussian,
+    add_backbone,
+    add_head,
+    block_dct,
+    run_backbone,
+    run_head,
+)
+from experiments.benchmarks.torch_similarity import lpips, ssim, stft_distance
 
 
 class AudioEncoder(nn.Module):
@@ -92,26 +33,29 @@ class AudioEncoder(nn.Module):
 
     def __init__(self, config: Audio2GesturesConfig, bands: int) -> None:
         super().__init__()
-        self.TCN_0 = TCN(bands, config.audio_channels, config.kernel_size)
-        self.GaussianHead_0 = GaussianHead(config.audio_channels[-1], config.head_channels, config.code_channels)
+        width = add_backbone(self, config, bands, config.audio_channels)
+        add_head(self, config, width, config.head_channels, 0, shared=True)
 
     def forward(self, audio: Tensor) -> Gaussian:
-        return self.GaussianHead_0(self.TCN_0(audio))
+        return run_head(self, 0, run_backbone(self, audio))
 
 
 class MotionEncoder(nn.Module):
-    """Motion to the shared and the specific code."""
+    """Motion to the shared and the specific code; None for the latter where the code is not split."""
 
     def __init__(self, config: Audio2GesturesConfig, pose: int) -> None:
         super().__init__()
-        head, code = config.head_channels, config.code_channels
-        self.TCN_0 = TCN(pose, config.motion_channels, config.kernel_size)
-        self.Dense_0, self.Dense_1 = Conv(config.motion_channels[-1], head), Conv(config.motion_channels[-1], head)
-        self.GaussianHead_0, self.GaussianHead_1 = GaussianHead(head, head, code), GaussianHead(head, head, code)
+        head = config.head_channels
+        width = add_backbone(self, config, pose, config.motion_channels)
+        self.Dense_0 = Conv(width, head)
+        self.Dense_1 = Conv(width, head) if config.split else None
+        for number in range(1 + config.split):
+            add_head(self, config, head, head, number, shared=number == 0)
 
-    def forward(self, motion: Tensor) -> tuple[Gaussian, Gaussian]:
-        x = self.TCN_0(motion)
-        return self.GaussianHead_0(self.Dense_0(x)), self.GaussianHead_1(self.Dense_1(x))
+    def forward(self, motion: Tensor) -> tuple[Gaussian, Gaussian | None]:
+        x = run_backbone(self, motion)
+        shared = run_head(self, 0, self.Dense_0(x))
+        return shared, None if self.Dense_1 is None else run_head(self, 1, self.Dense_1(x))
 
 
 class Decoder(nn.Module):
@@ -120,11 +64,13 @@ class Decoder(nn.Module):
     def __init__(self, config: Audio2GesturesConfig, pose: int) -> None:
         super().__init__()
         width = config.decoder_channels[-1]
-        self.TCN_0 = TCN(2 * config.code_channels, config.decoder_channels, config.kernel_size)
+        codes = (1 + config.split) * config.code_channels
+        self.TCN_0 = TCN(codes, config.decoder_channels, config.kernel_size)
         self.Dense_0, self.Dense_1 = Conv(width, pose), Conv(width, width)
 
-    def forward(self, shared: Tensor, specific: Tensor) -> Tensor:
-        return self.Dense_0(torch.relu(self.Dense_1(self.TCN_0(torch.cat([shared, specific], dim=1)))))
+    def forward(self, shared: Tensor, specific: Tensor | None = None) -> Tensor:
+        x = shared if specific is None else torch.cat([shared, specific], dim=1)
+        return self.Dense_0(torch.relu(self.Dense_1(self.TCN_0(x))))
 
 
 class MappingNet(nn.Module):
@@ -134,13 +80,13 @@ class MappingNet(nn.Module):
         super().__init__()
         code, taps = config.code_channels, config.kernel_size
         self.Conv1D_0, self.Conv1D_1, self.Conv1D_2 = (Conv(code, code, taps) for _ in range(3))
-        self.GaussianHead_0 = GaussianHead(code, code, code)
+        add_head(self, config, code, code, 0, shared=False)
 
     def forward(self, noise: Tensor) -> Gaussian:
         x = self.Conv1D_0(noise)
         x = self.Conv1D_1(torch.relu(x))
         x = self.Conv1D_2(torch.relu(x))
-        return self.GaussianHead_0(x)
+        return run_head(self, 0, x)
 
 
 def matrix_from_6d(six: Tensor) -> Tensor:
@@ -189,15 +135,26 @@ class Noise(NamedTuple):
 class Twin(nn.Module):
     """The four networks, forward kinematics and losses."""
 
-    def __init__(self, config: Audio2GesturesConfig, skeleton: Skeleton, bands: int) -> None:
+    def __init__(
+        self,
+        config: Audio2GesturesConfig,
+        skeleton: Skeleton,
+        bands: int,
+        features: Callable[[Tensor], list[Tensor]] | None = None,
+    ) -> None:
+        """
+        Args:
+            features: of motion (B, 6 J, T), blocks (B, C, T), for LPIPS.
+        """
         super().__init__()
+        self.features = features
         if config.normalise_pose or config.dropout > 0:
             raise ValueError("Expected a configuration without pose normalisation and dropout, as in the papers.")
         self.config = config
         self.audio_encoder = AudioEncoder(config, bands)
         self.motion_encoder = MotionEncoder(config, 6 * skeleton.joints)
         self.decoder = Decoder(config, 6 * skeleton.joints)
-        self.mapping_net = MappingNet(config)
+        self.mapping_net = MappingNet(config) if config.split and config.mapping else None
         self.levels = [(np.array(level), [skeleton.parents[joint] for joint in level]) for level in skeleton.levels]
         self.register_buffer("offsets", torch.tensor(np.asarray(skeleton.offsets)), persistent=False)
         for number, (level, parents) in enumerate(self.levels):
@@ -228,54 +185,100 @@ class Twin(nn.Module):
     def terms(self, audio: Tensor, pose: Tensor, noise: Noise) -> dict[str, Tensor]:
         """Every loss, unweighted, of normalised audio (B, T, bands) and motion (B, T, J, 6)."""
         clips = len(audio)
-        audio_shared = self.audio_encoder(audio.transpose(1, 2))
-        motion_shared, motion_specific = self.motion_encoder(pose.flatten(2).transpose(1, 2))
-        s_audio = audio_shared.shift(noise.audio)
-        s_motion = motion_shared.shift(noise.motion)
-        i_motion = motion_specific.shift(noise.specific)
+        audio_shared = self._encode(self.audio_encoder, audio.transpose(1, 2))
+        motion_shared, motion_specific = self._encode(self.motion_encoder, pose.flatten(2).transpose(1, 2))
+        s_audio = self._in_time(audio_shared.shift(noise.audio))
+        s_motion = self._in_time(motion_shared.shift(noise.motion))
+        common = {"alignment": (s_audio - s_motion).abs().mean()}
+        if self.config.latent != "dct":
+            common["kl_shared"] = _kl(audio_shared) + _kl(motion_shared)
+        if motion_specific is None:
+            made = self.rotations(self.decoder(torch.cat([s_motion, s_audio])))
+            return common | self._motion_terms(pose, made)
+        i_motion = self._in_time(motion_specific.shift(noise.specific))
 
-        mean = i_motion.detach().mean(2, keepdim=True)
-        std = i_motion.detach().std(2, keepdim=True, correction=0)
-        mapped = self.mapping_net(torch.cat([mean + std * noise.first, mean + std * noise.second]))
-        i_random = mapped.shift(noise.mapped)
+        i_random, kl_specific = noise.mapped, _kl(motion_specific)
+        if self.mapping_net is not None:
+            mean = i_motion.detach().mean(2, keepdim=True)
+            std = i_motion.detach().std(2, keepdim=True, correction=0)
+            mapped = self.mapping_net(torch.cat([mean + std * noise.first, mean + std * noise.second]))
+            i_random, kl_specific = self._in_time(mapped.shift(noise.mapped)), kl_specific + _kl(mapped)
 
         shared = torch.cat([s_motion, s_audio, s_audio, s_audio])
         specific = torch.cat([i_motion, i_motion, i_random])
         rotations = self.rotations(self.decoder(shared, specific))
         true_rotations = matrix_from_6d(pose)
-        positions = self.positions(torch.cat([true_rotations, rotations]))
-        target, rebuilt, transferred, sampled, other = positions.chunk(5)
         drawn = rotations[2 * clips : 3 * clips]
-        again = drawn[..., :2].transpose(-1, -2).flatten(2)
-        recovered = self.motion_encoder(again.transpose(1, 2))[1]
-
-        both, twice = torch.cat([rebuilt, transferred]), torch.cat([target, target])
-        rotation_twice = torch.cat([true_rotations, true_rotations])
+        target, sampled, other = self.positions(torch.cat([true_rotations, rotations[2 * clips :]])).chunk(3)
+        recovered = self._encode(self.motion_encoder, self._flat(drawn))[1]
+        assert recovered is not None
         excess = (sampled - target).abs().sum(-1) - self.config.relaxed_threshold
         return {
-            "rotation": geodesic_distance(rotations[: 2 * clips], rotation_twice).mean(),
-            "position": _distance(both, twice),
-            "speed": _distance(both.diff(dim=1), twice.diff(dim=1)),
-            "alignment": (s_audio - s_motion).abs().mean(),
-            "kl_shared": _kl(audio_shared) + _kl(motion_shared),
-            "kl_specific": _kl(motion_specific) + _kl(mapped),
+            **common,
+            **self._motion_terms(pose, rotations[: 2 * clips]),
+            "kl_specific": kl_specific,
             "relaxed": torch.clamp(excess, min=0.0).mean(),
             "sampled_rotation": geodesic_distance(drawn, true_rotations).mean(),
             "sampled_speed": _distance(sampled.diff(dim=1), target.diff(dim=1)),
-            "bicycle": (i_random[:clips].detach() - recovered.mean).abs().mean(),
+            "bicycle": (i_random[:clips].detach() - self._in_time(recovered.mean)).abs().mean(),
             "diversity": -_distance(sampled, other),
         }
+
+    def _motion_terms(self, pose: Tensor, rotations: Tensor) -> dict[str, Tensor]:
+        """Of the reconstruction and the translation, one after the other, against the truth."""
+        true_rotations = matrix_from_6d(pose)
+        target, both = self.positions(true_rotations), self.positions(rotations)
+        twice = torch.cat([target, target])
+        terms = {
+            "rotation": geodesic_distance(rotations, torch.cat([true_rotations, true_rotations])).mean(),
+            "position": _distance(both, twice),
+            "speed": _distance(both.diff(dim=1), twice.diff(dim=1)),
+        }
+        if self.config.stft_weight > 0:
+            terms["stft"] = stft_distance(both.flatten(2), twice.flatten(2))
+        if self.config.ssim_weight > 0:
+            terms["ssim"] = 1.0 - ssim(both.flatten(2), twice.flatten(2))
+        if self.config.lpips_weight > 0:
+            assert self.features is not None
+            truth = pose.flatten(2).transpose(1, 2)
+            terms["lpips"] = lpips(self.features(self._flat(rotations)), self.features(torch.cat([truth, truth])))
+        return terms
+
+    def _flat(self, rotations: Tensor) -> Tensor:
+        """Rotations (B, T, J, 3, 3) as motion (B, 6 J, T)."""
+        return rotations[..., :2].transpose(-1, -2).flatten(2).transpose(1, 2)
+
+    def _encode(self, encoder: nn.Module, x: Tensor) -> Any:
+        """Codes; with the DCT, of each block for itself."""
+        points = self.config.dct_points
+        if self.config.latent != "dct":
+            return encoder(x)
+        blocks = x.unflatten(2, (-1, points)).transpose(1, 2)
+        codes = encoder(blocks.flatten(0, 1))
+
+        def join(code: Gaussian) -> Gaussian:
+            return Gaussian(*(part.unflatten(0, blocks.shape[:2]).transpose(1, 2).flatten(2) for part in code))
+
+        return join(codes) if isinstance(codes, Gaussian) else tuple(join(code) for code in codes)
+
+    def _in_time(self, code: Tensor) -> Tensor:
+        """A code as the decoder takes it."""
+        return block_dct(code, self.config.dct_points, inverse=True) if self.config.latent == "dct" else code
 
     def weights(self, step: int) -> dict[str, float]:
         """Weight of each loss at a step."""
         c = self.config
+        together = min(step / c.alignment_ramp_steps, 1.0) if c.alignment_ramp_steps else 1.0
         ramp = min(step / c.kl_ramp_steps, 1.0) if c.kl_ramp_steps else 1.0
         decay = max(1.0 - step / c.diversity_decay_steps, 0.0) if c.diversity_decay_steps else 1.0
         return {
             "rotation": c.rotation_weight,
             "position": c.position_weight,
             "speed": c.speed_weight,
-            "alignment": c.alignment_weight,
+            "stft": c.stft_weight,
+            "ssim": c.ssim_weight,
+            "lpips": c.lpips_weight,
+            "alignment": c.alignment_weight * together,
             "kl_shared": c.kl_shared_weight * ramp,
             "kl_specific": c.kl_specific_weight * ramp,
             "relaxed": c.relaxed_weight,
@@ -291,6 +294,8 @@ class Twin(nn.Module):
         Args:
             noise: for the mapping net's input, the shared code and the specific code, each (B, channels, frames).
         """
+        if self.mapping_net is None:
+            raise ValueError("Expected a configuration with a mapping net.")
         code = self.mapping_net(mean + std * noise[0])
         return self.rotations(self.decoder(shared.shift(noise[1]), code.shift(noise[2])))
 

@@ -1,5 +1,6 @@
 """Our Audio2Gestures and its PyTorch twin: same weights, same noise, same numbers."""
 
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -13,9 +14,12 @@ from a2g_jax.models import audio2gestures
 from a2g_jax.models.audio2gestures import objective
 from a2g_jax.models.audio2gestures.codec import Networks
 from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.motion_autoencoder import MotionAutoencoderConfig, encode
+from a2g_jax.models.motion_autoencoder import build as build_autoencoder
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_twin")
+layers = pytest.importorskip("experiments.benchmarks.torch_layers")
 
 #: A small tree with forks: the compiler, not the sums, takes this test's time.
 PARENTS = (-1, 0, 0, 1, 1, 2)
@@ -28,36 +32,44 @@ CONFIG = audio2gestures.Audio2GesturesConfig(
     code_channels=4,
     clip_frames=FRAMES,
 )
-TERMS = (
-    "rotation",
-    "position",
-    "speed",
-    "alignment",
-    "kl_shared",
-    "kl_specific",
-    "relaxed",
-    "sampled_rotation",
-    "sampled_speed",
-    "bicycle",
-    "diversity",
-)
+#: What Table 2, 4, 5 and 6 change in the networks and losses.
+VARIANTS = {
+    "gru": replace(CONFIG, backbone="gru", recurrent_layers=2, recurrent_channels=5),
+    "transformer": replace(
+        CONFIG, backbone="transformer", attention_layers=2, attention_channels=6, attention_hidden=9, attention_window=6
+    ),
+    # Two blocks to a clip.
+    "dct": replace(CONFIG, latent="dct", dct_points=8),
+    "no split": replace(CONFIG, split=False),
+    "no mapping net": replace(CONFIG, mapping=False),
+    # Longer than one window of the transform, and no multiple of its hop.
+    "structural losses": replace(CONFIG, clip_frames=44, stft_weight=1.0, ssim_weight=1.0, lpips_weight=1.0),
+}
+EYES = MotionAutoencoderConfig(encoder_channels=(7, 6, 5, 4), decoder_channels=(4,), clip_frames=16)
 
 
-def _setting(dtype):
+def _setting(dtype, config=CONFIG):
     """Networks, parameters, a batch of smooth motion and the key of a step; all from fixed seeds."""
     rng = np.random.default_rng(3)
     skeleton = Skeleton(rng.normal(0, 0.2, (JOINTS, 3)).astype(dtype), tuple("abcdef"), PARENTS)
     statistics = Statistics(np.zeros((JOINTS, 6), dtype), np.ones((JOINTS, 6), dtype))
     data = Data(skeleton, 30.0, BANDS, statistics)
-    params = jax.tree.map(lambda p: jnp.asarray(p, dtype), Networks(CONFIG, data).init(jax.random.key(5)))
+    features = None
+    if config.lpips_weight > 0:
+        eyes = jax.tree.map(lambda p: jnp.asarray(p, dtype), build_autoencoder(EYES, data).init(jax.random.key(8)))
+        network = layers.TCN(6 * JOINTS, EYES.encoder_channels, EYES.kernel_size)
+        twins.load_params(network, eyes["encoder"])
+        data = data._replace(perceptual=lambda pose, data=data: encode(EYES, data, eyes, pose))
+        features = network.blocks
+    params = jax.tree.map(lambda p: jnp.asarray(p, dtype), Networks(config, data).init(jax.random.key(5)))
     # Biases start at zero; drawn ones show whether each reaches its place.
     params = jax.tree.map(lambda p: p + jnp.asarray(rng.normal(0, 0.05, p.shape), dtype), params)
-    pose = np.cumsum(rng.normal(0, 0.1, (CLIPS, FRAMES, JOINTS, 6)), axis=1) + np.eye(3)[:2].reshape(6)
+    pose = np.cumsum(rng.normal(0, 0.1, (CLIPS, config.clip_frames, JOINTS, 6)), axis=1) + np.eye(3)[:2].reshape(6)
     batch = Batch(
-        jnp.asarray(rng.normal(size=(CLIPS, FRAMES, BANDS)), dtype),
+        jnp.asarray(rng.normal(size=(CLIPS, config.clip_frames, BANDS)), dtype),
         jnp.asarray(pose, dtype),
     )
-    twin = twins.Twin(CONFIG, skeleton, BANDS).to(getattr(torch, np.dtype(dtype).name))
+    twin = twins.Twin(config, skeleton, BANDS, features).to(getattr(torch, np.dtype(dtype).name))
     twins.load_params(twin, params)
     return data, params, batch, jax.random.key(11), twin
 
@@ -70,11 +82,12 @@ def _channels_second(array):
     return _torch(array).transpose(1, 2).contiguous()
 
 
-def _noise(key, dtype):
+def _noise(key, dtype, config):
     """What our step draws from its key, in the order in which it does."""
-    keys = jax.random.split(key, 10)
-    draws = [jax.random.normal(keys[i], (CLIPS, FRAMES, CONFIG.code_channels), dtype) for i in range(5)]
-    draws.append(jax.random.normal(keys[5], (2 * CLIPS, FRAMES, CONFIG.code_channels), dtype))
+    keys = jax.random.split(key, 10 if config.split else 5)
+    frames, channels = config.clip_frames, config.code_channels
+    draws = [jax.random.normal(keys[i % len(keys)], (CLIPS, frames, channels), dtype) for i in range(5)]
+    draws.append(jax.random.normal(keys[5 % len(keys)], (2 * CLIPS, frames, channels), dtype))
     return twins.Noise(*(_channels_second(draw) for draw in draws))
 
 
@@ -111,24 +124,26 @@ def test_networks_agree():
     close(pose.reshape(CLIPS, FRAMES, -1), theirs.detach().transpose(1, 2))
 
 
-def _compare(dtype, tolerance):
-    data, params, batch, key, twin = _setting(dtype)
-    model = audio2gestures.build(CONFIG, data)
+def _compare(dtype, tolerance, config=CONFIG):
+    data, params, batch, key, twin = _setting(dtype, config)
+    model = audio2gestures.build(config, data)
+    theirs = twin.terms(_torch(batch.audio), _torch(batch.pose), _noise(key, dtype, config))
+    weighted = set(objective.weights(config)(jnp.int32(0)))
+    names = sorted(weighted & set(jax.eval_shape(model.loss, params, key, batch, jnp.int32(0))[1]))
+    assert sorted(theirs) == names
 
     def terms(params):
         values = model.loss(params, key, batch, jnp.int32(0))[1]
-        return jnp.stack([values[name] for name in TERMS])
+        return jnp.stack([values[name] for name in names])
 
     @jax.jit
     def ours_with_gradients(params):
         values, pull = jax.vjp(terms, params)
         # One term after another: a loop compiles the backward pass once.
-        return values, jax.lax.map(lambda row: pull(row)[0], jnp.eye(len(TERMS), dtype=dtype))
+        return values, jax.lax.map(lambda row: pull(row)[0], jnp.eye(len(names), dtype=dtype))
 
     ours, ours_gradients = ours_with_gradients(params)
-    theirs = twin.terms(_torch(batch.audio), _torch(batch.pose), _noise(key, dtype))
-    assert set(theirs) == set(TERMS)
-    for number, name in enumerate(TERMS):
+    for number, name in enumerate(names):
         np.testing.assert_allclose(float(ours[number]), theirs[name].item(), rtol=tolerance, err_msg=name)
         twin.zero_grad()
         theirs[name].backward(retain_graph=True)
@@ -153,11 +168,31 @@ def test_losses_and_gradients_agree_in_double_precision(x64):
     _compare(np.float64, 1e-9)
 
 
+@pytest.mark.parametrize("name", VARIANTS)
+def test_variants_agree(name):
+    """Outputs are compared too: every loss is of them."""
+    _compare(np.float32, 1e-3, VARIANTS[name])
+
+
+@pytest.mark.parametrize("name", ["gru", "transformer", "dct"])
+def test_encoders_agree(name):
+    config = VARIANTS[name]
+    data, params, batch, _, twin = _setting(np.float32, config)
+    networks = Networks(config, data)
+    ours = jax.jit(lambda p, b: (networks.encode_audio(p, b.audio), networks.encode_motion(p, b.pose)))(params, batch)
+    theirs = (
+        twin._encode(twin.audio_encoder, _channels_second(batch.audio)),
+        twin._encode(twin.motion_encoder, _torch(batch.pose).flatten(2).transpose(1, 2)),
+    )
+    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
+        np.testing.assert_allclose(mine, other.detach().transpose(1, 2), atol=1e-4)
+
+
 def test_loss_weights_agree():
-    *_, twin = _setting(np.float32)
-    weights = objective.weights(CONFIG)(jnp.int32(30_000))
+    config = replace(VARIANTS["structural losses"], alignment_ramp_steps=40_000)
+    *_, twin = _setting(np.float32, config)
+    weights = objective.weights(config)(jnp.int32(30_000))
     assert {name: float(weight) for name, weight in weights.items()} == pytest.approx(twin.weights(30_000))
-    assert set(weights) == set(TERMS)
 
 
 def test_load_params_refuses_other_networks():
