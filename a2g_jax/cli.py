@@ -208,7 +208,10 @@ def make_parser() -> argparse.ArgumentParser:
     )
     pin = generate.add_argument_group("clips on the timeline")
     pin.add_argument(
-        "--pin", action="append", metavar="FILE@SECOND", help="a BVH or NPZ to perform from then on; may be repeated"
+        "--pin",
+        action="append",
+        metavar="FILE@SECOND[+LENGTH]",
+        help="a BVH or NPZ to perform from then on (its first LENGTH seconds); may be repeated",
     )
     pin.add_argument(
         "--pin-blend", type=_number(float, 0.0, 10.0, "seconds"), metavar="SECONDS", help="around each (default: 0.5)"

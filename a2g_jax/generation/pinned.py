@@ -14,6 +14,7 @@ from a2g_jax.generation.latent import LatentSpace
 from a2g_jax.generation.pin_report import corpus_jerk, local_places, report_pins, wrist_jerk
 from a2g_jax.generation.timeline import Pin, check_pins, pin_codes, read_pin
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.training.run import Run
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class Pins:
     """What is asked for."""
 
     texts: tuple[str, ...]
-    """Each ``FILE@SECOND``."""
+    """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
     blend: float = 0.5
     """Seconds on either side of a clip."""
     shared: float = 0.0
@@ -41,7 +42,8 @@ class Pins:
         """
         space = LatentSpace(run)
         config = run.config
-        pins = [read_pin(text, config.skeleton, config.fps) for text in self.texts]
+        facing = np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean[0])), np.float64)
+        pins = [read_pin(text, config.skeleton, config.fps, facing) for text in self.texts]
         if self.corpus is not None and not self.corpus.skeleton.same_tree(config.skeleton):
             raise InputError(f"--pin-corpus {self.corpus.path}: has another skeleton than the run.")
         limit = None if self.corpus is None else corpus_jerk(self.corpus)
@@ -76,7 +78,7 @@ class Pinned:
             limit, source = self.limit, "99th percentile of the corpus"
             if limit is None:
                 limit, source = self._usual(plain), "99th percentile of the clips and the unpinned sample"
-            reports.append(report_pins(self.pins, motion, plain, limit, source))
+            reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
             yield motion
 
     def lane(self) -> "Track":

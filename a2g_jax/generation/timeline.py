@@ -4,6 +4,7 @@ The motion-specific code of the clip takes the place of the drawn one from frame
 transitions. The shared code stays the audio's, as in the paper; a share of the clip's own can be blended in.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,10 @@ from a2g_jax.io.npz import read_motion_npz
 
 #: Shortest clip that is pinned, seconds: shorter ones drown in their transitions.
 SHORTEST = 0.2
+#: Degrees by which a bone at rest may point elsewhere before a clip on the same joints is retargeted.
+_SAME_REST = 1.0
+#: A second from 0 on, and maybe how many seconds of the clip.
+_FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 
 
 class Pin(NamedTuple):
@@ -34,6 +39,8 @@ class Pin(NamedTuple):
     """Seconds."""
     motion: Motion
     """On the run's skeleton, at its frame rate."""
+    turned: float = 0.0
+    """Degrees about the vertical by which it was turned to face as the run's motions do."""
 
     @property
     def first(self) -> int:
@@ -46,38 +53,78 @@ class Pin(NamedTuple):
         return self.first + self.motion.frames
 
 
-def parse_pin(text: str) -> tuple[Path, float]:
-    """File and second of ``wave.bvh@3.2``.
+def parse_pin(text: str) -> tuple[Path, float, float | None]:
+    """File, second and seconds of ``wave.bvh@3.2`` (the whole clip) or ``wave.bvh@3.2+1.5`` (its first 1.5 seconds).
 
     Raises:
         InputError: of another form.
     """
-    path, at, seconds = text.rpartition("@")
-    try:
-        start = float(seconds)
-    except ValueError:
-        start = float("nan")
-    if not at or not path or not 0.0 <= start < float("inf"):
-        raise InputError(f"--pin {text}: expected a file and a second from 0 on, such as wave.bvh@3.2.")
-    return Path(path), start
+    found = _FORM.fullmatch(text)
+    if found is None:
+        raise InputError(
+            f"--pin {text}: expected a file and a second from 0 on, such as wave.bvh@3.2, or wave.bvh@3.2+1.5 for the"
+            " clip's first 1.5 seconds."
+        )
+    length = found["length"]
+    return Path(found["path"]), float(found["start"]), None if length is None else float(length)
 
 
-def read_pin(text: str, skeleton: Skeleton, fps: float) -> Pin:
-    """The clip of ``wave.bvh@3.2``: any humanoid BVH, or an NPZ that this package wrote, on the run's skeleton.
+def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray, "3 3"] | None = None) -> Pin:
+    """The clip of a pin: any humanoid BVH, or an NPZ that this package wrote, on the run's skeleton.
+
+    Args:
+        text: as :func:`parse_pin` takes it.
+        facing: the root's usual rotation, by which the clip is turned as :func:`face` does.
 
     Raises:
-        InputError: a file that cannot be read, a rig that is not understood, or a clip shorter than a fifth of a
-            second.
+        InputError: a file that cannot be read, a rig that is not understood, a clip shorter than a fifth of a second,
+            or one shorter than what is asked of it.
     """
-    path, start = parse_pin(text)
+    path, start, length = parse_pin(text)
     motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
-    if not motion.skeleton.same_tree(skeleton):
+    if not same_rest(motion.skeleton, skeleton):
         source = find_rig(motion, name=str(path))
         motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
-    motion = resample(motion, fps)
+    # Bones of other lengths on the same joints need no retargeting: the codes are of rotations alone.
+    motion = resample(replace(motion, skeleton=skeleton), fps)
+    if length is not None:
+        frames = round(length * fps)
+        if frames > motion.frames:
+            raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; ask for no more than that.")
+        motion = replace(motion, rotations=motion.rotations[:frames], root=motion.root[:frames])
     if motion.seconds < SHORTEST:
         raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST} s or more.")
-    return Pin(str(path), start, motion)
+    turned = 0.0
+    if facing is not None:
+        motion, turned = face(motion, facing)
+    return Pin(str(path), start, motion, turned)
+
+
+def same_rest(first: Skeleton, second: Skeleton) -> bool:
+    """Whether joints are the same and bones at rest point the same way, whatever their lengths."""
+    if not first.same_tree(second):
+        return False
+    ours, theirs = (np.asarray(skeleton.offsets, np.float64)[1:] for skeleton in (first, second))
+    lengths = np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1)
+    bones = lengths > 1e-8
+    cosine = (ours * theirs).sum(axis=1)[bones] / lengths[bones]
+    return bool(np.all(cosine > np.cos(np.deg2rad(_SAME_REST))))
+
+
+def face(motion: Motion, facing: Float[np.ndarray, "3 3"]) -> tuple[Motion, float]:
+    """A motion turned about the vertical so that its root is, on the whole, nearest to a rotation; and the degrees.
+
+    The angle has the least sum of squared differences of matrices in closed form: with ``A`` the sum of
+    ``R_t F^T`` over frames, ``trace(Y A)`` is greatest.
+    """
+    moment = np.einsum("tij,kj->ik", np.asarray(motion.rotations[:, 0], np.float64), facing)
+    angle = np.arctan2(moment[2, 0] - moment[0, 2], moment[0, 0] + moment[2, 2])
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
+    rotations, root = np.array(motion.rotations), np.asarray(motion.root)
+    rotations[:, 0] = turn @ rotations[:, 0]
+    turned = replace(motion, rotations=rotations, root=(root @ turn.T).astype(root.dtype))
+    return turned, float(np.rad2deg(angle))
 
 
 def check_pins(pins: Sequence[Pin], frames: int, fps: float) -> list[Pin]:

@@ -1,6 +1,7 @@
 """Pins: parsing, places, codes, and how closely they are followed."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.generation.latent import LatentSpace
 from a2g_jax.generation.pin_report import report_pins
-from a2g_jax.generation.timeline import Pin, check_pins, parse_pin, pin_codes, pin_weights, read_pin
+from a2g_jax.generation.timeline import Pin, check_pins, face, parse_pin, pin_codes, pin_weights, read_pin, same_rest
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
@@ -34,12 +35,17 @@ def speech():
     return talk(8.0, 5)
 
 
-@pytest.mark.parametrize(("text", "path", "second"), [("a.bvh@3.2", "a.bvh", 3.2), ("b@c.npz@0", "b@c.npz", 0.0)])
-def test_parse(text, path, second):
-    assert parse_pin(text) == (Path(path), second)
+@pytest.mark.parametrize(
+    ("text", "path", "second", "length"),
+    [("a.bvh@3.2", "a.bvh", 3.2, None), ("b@c.npz@0", "b@c.npz", 0.0, None), ("a+b.bvh@8+1.5", "a+b.bvh", 8.0, 1.5)],
+)
+def test_parse(text, path, second, length):
+    assert parse_pin(text) == (Path(path), second, length)
 
 
-@pytest.mark.parametrize("text", ["a.bvh", "a.bvh@", "@3", "a.bvh@-1", "a.bvh@soon", "a.bvh@inf"])
+@pytest.mark.parametrize(
+    "text", ["a.bvh", "a.bvh@", "@3", "a.bvh@-1", "a.bvh@soon", "a.bvh@inf", "a.bvh@3+", "a.bvh@3+x"]
+)
 def test_refused(text):
     with pytest.raises(InputError, match=r"such as wave\.bvh@3\.2"):
         parse_pin(text)
@@ -115,6 +121,65 @@ def test_another_rig_and_rate_are_brought_to_the_runs(clip, tmp_path):
     write_bvh(tmp_path / "blink.bvh", part(clip, 0, 3))
     with pytest.raises(InputError, match=r"lasts 0\.10 s"):
         read_pin(f"{tmp_path / 'blink.bvh'}@1.5", skeleton, 30.0)
+
+
+def test_a_part_of_a_clip(clip, tmp_path):
+    write_bvh(tmp_path / "wave.bvh", clip)
+    skeleton = demo_run().config.skeleton
+    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1+0.5", skeleton, 30.0)
+    assert pin.motion.frames == 15
+    np.testing.assert_allclose(pin.motion.rotations, clip.rotations[:15], atol=1e-4)
+    with pytest.raises(InputError, match=r"lasts 2\.00 s; ask for no more"):
+        read_pin(f"{tmp_path / 'wave.bvh'}@1+2.5", skeleton, 30.0)
+
+
+def test_longer_bones_stay_as_they_are_and_another_rest_pose_is_retargeted(clip):
+    skeleton = clip.skeleton
+    assert same_rest(skeleton, skeleton.scaled(1.3))
+    offsets = np.array(skeleton.offsets)
+    elbow = skeleton.names.index("L_Elbow")
+    offsets[elbow] = offsets[elbow][[1, 0, 2]]
+    assert not same_rest(skeleton, replace(skeleton, offsets=offsets))
+
+
+def test_a_clip_is_turned_to_face_as_the_run_does(clip):
+    facing = np.eye(3)
+    straight, _ = face(clip, facing)
+    turned, second = face(face(clip, rotation_y(70.0))[0], facing)
+    np.testing.assert_allclose(turned.rotations, straight.rotations, atol=1e-6)
+    assert second == pytest.approx(-70.0)
+
+    # The best angle: none beside it is nearer.
+    def away(motion):
+        return np.square(motion.rotations[:, 0] - facing[None]).sum()
+
+    for degrees in (-1.0, 1.0):
+        other = replace(straight, rotations=straight.rotations.copy())
+        other.rotations[:, 0] = rotation_y(degrees) @ straight.rotations[:, 0]
+        assert away(other) > away(straight)
+
+
+def rotation_y(degrees):
+    """Matrix."""
+    angle = np.deg2rad(degrees)
+    return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+
+
+def test_a_clip_at_the_beginning_has_one_seam_and_a_wide_blend_is_seen_whole(speech):
+    motion = speech.motion
+    rough = replace(motion, rotations=motion.rotations.copy())
+    # A jolt 0.6 s before frame 60, and one right at the motion's beginning.
+    for at in (0, 42):
+        rough.rotations[at, 3:] = rough.rotations[at + 40, 3:]
+    pin = Pin("late", 2.0, part(motion, 0, 60))
+    near, far = (report_pins([pin], rough, rough, 1e4, "", blend)[0]["seam_jerk"] for blend in (0.25, 0.75))
+    assert far > 2.0 * near
+    early = Pin("early", 0.0, part(motion, 0, 90))
+    whole = Pin("whole", 0.0, motion)
+    (start,), (all_of_it,) = (report_pins([p], rough, rough, 1e4, "") for p in (early, whole))
+    assert start["seam_jerk"] < far
+    assert all_of_it["seam_jerk"] == 0.0
+    assert all_of_it["smooth"]
 
 
 def test_from_the_command_line(clip, speech, tmp_path, capsys):
