@@ -214,7 +214,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="a BVH or NPZ to perform from then on (its first LENGTH seconds); may be repeated",
     )
     pin.add_argument(
-        "--pin-blend", type=_number(float, 0.0, 10.0, "seconds"), metavar="SECONDS", help="around each (default: 0.5)"
+        "--pin-blend", type=_number(float, 0.0, 10.0, "seconds"), metavar="SECONDS", help="around each (default: 0.75)"
     )
     pin.add_argument(
         "--pin-shared",

@@ -62,7 +62,7 @@ def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
 
 
 def report_pins(
-    pins: Sequence[Pin], pinned: Motion, plain: Motion, limit: float, source: str, blend: float = 0.5
+    pins: Sequence[Pin], pinned: Motion, plain: Motion, limit: float, source: str, blend: float = 0.75
 ) -> list[dict[str, Any]]:
     """For each pin, JSON-able: its place, how far the pinned and the unpinned motion are from it, and its seams' jerk.
 

@@ -27,7 +27,7 @@ class Pins:
 
     texts: tuple[str, ...]
     """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
-    blend: float = 0.5
+    blend: float = 0.75
     """Seconds on either side of a clip."""
     shared: float = 0.0
     """From 0 to 1, how far a clip's own shared code replaces the audio's."""

@@ -157,7 +157,7 @@ def pin_weights(frames: int, first: int, stop: int, blend: int) -> Float[np.ndar
 
 
 def pin_codes(
-    space: LatentSpace, codes: Codes, pins: Sequence[Pin], *, blend: float = 0.5, shared: float = 0.0
+    space: LatentSpace, codes: Codes, pins: Sequence[Pin], *, blend: float = 0.75, shared: float = 0.0
 ) -> Codes:
     """The codes with those of the clips in their places.
 

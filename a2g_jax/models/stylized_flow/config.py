@@ -25,6 +25,13 @@ class StylizedFlowConfig:
     """Frames of audio after its own that a frame is told of."""
     frame_dropout: float = 0.4
     """Share of the told poses that are hidden in training, so that the audio is listened to."""
+    input_noise: float = 0.02
+    """Standard deviation of the noise that likelihoods see poses through, in z-scores; 0 for none.
+
+    Channels that hardly move, or that follow from others as the six numbers of a rotation do, have a density without
+    bound: the likelihood grows by fitting them alone, and its gradient with it. The noise bounds it; the papers name
+    none.
+    """
     freedom: float = 50.0
     """Degrees of freedom of the Student-t prior; 0 for a normal one (MoGlow)."""
     global_channels: int = 32
@@ -63,7 +70,7 @@ class StylizedFlowConfig:
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 to 1; got {getattr(self, name)}.")
         for field in fields(self):
             value = getattr(self, field.name)
-            bounded = field.name in ("freedom", "temperature") or field.name.endswith("_weight")
+            bounded = field.name in ("freedom", "temperature", "input_noise") or field.name.endswith("_weight")
             if bounded and not 0 <= value < float("inf"):
                 raise InputError(f"--{field.name.replace('_', '-')}: expected 0 or more; got {value}.")
         if self.clip_frames <= self.history_frames + self.lookahead_frames:

@@ -28,13 +28,18 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
     networks = Networks(config, data)
     likelihood, reverse = _likelihood(networks), _reverse(networks)
 
+    def noisy(key: Key[Array, ""], flat: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
+        if config.input_noise == 0:
+            return flat
+        return flat + config.input_noise * jax.random.normal(key, flat.shape, flat.dtype)
+
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
         """Bits per frame, and on a share of the batches the losses of the reverse pass."""
         del step
-        hide_key, which_key, reverse_key = jax.random.split(key, 3)
-        flat = networks.flat(batch.pose)
+        hide_key, which_key, reverse_key, noise_key = jax.random.split(key, 4)
+        flat = noisy(noise_key, networks.flat(batch.pose))
         clips, frames = len(flat), networks.inner(flat).shape[1]
         seen = hidden(hide_key, config.frame_dropout, (clips, frames, config.history_frames))
         told = networks.told(params, batch.audio, flat, seen)
@@ -54,14 +59,15 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
     def validation_loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """Bits per frame with every pose seen."""
-        del key, step
-        flat = networks.flat(batch.pose)
+        """Bits per frame with every pose seen, through the noise that training has."""
+        del step
+        flat = noisy(key, networks.flat(batch.pose))
         return likelihood(params, flat, networks.told(params, batch.audio, flat))
 
     def warm_start(params: Params, batch: Batch) -> Params:
-        """Actnorms set from the first batch."""
-        return networks.fitted(params, batch.audio, networks.flat(batch.pose))
+        """Actnorms set from the first batch, as likelihoods see it."""
+        flat = noisy(jax.random.key(0), networks.flat(batch.pose))
+        return networks.fitted(params, batch.audio, flat)
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
         """Mean over time of the latents of every clip."""
