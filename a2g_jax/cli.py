@@ -131,16 +131,16 @@ def make_parser() -> argparse.ArgumentParser:
     prepare.add_argument(
         "--waveform", action="store_true", help="keep the audio too, for models that look at it otherwise"
     )
+    prepare.add_argument(
+        "--pose",
+        choices=("6d", "exponential", "directions", "keypoints"),
+        help="how poses are written down (default: what the paper, the data set or the view has)",
+    )
     recorded = prepare.add_argument_group("of recordings")
     recorded.add_argument(
         "--joints",
         choices=("body", "upper-body", "all"),
         help="body: any rig on 22 joints; upper-body: on 47 with fingers; all: the rig as it is (default: body)",
-    )
-    recorded.add_argument(
-        "--pose",
-        choices=("6d", "exponential", "directions", "keypoints"),
-        help="how poses are written down (default: what the paper or the data set has)",
     )
     recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
     recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")

@@ -13,7 +13,7 @@ from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import NAMES, find_data_set
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_data_set, prepare_talker
+from a2g_jax.data.make import prepare_data_set, prepare_talker, view_poses
 from a2g_jax.data.on_demand import OnDemand
 from a2g_jax.data.settings import PRESETS, Features, find_features
 from a2g_jax.data.talker.recordings import talk
@@ -80,7 +80,7 @@ def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
 
 #: Flags of ``a2g prepare`` that only generated corpora have, and those that only recorded ones have.
 _GENERATED = ("minutes", "speakers", "emotions", "jitter", "fingers", "view", "on_demand")
-_RECORDED = ("source", "joints", "pose", "random_split", "skip_broken", "limit")
+_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit")
 
 
 def _refuse_flags(options: argparse.Namespace, names: tuple[str, ...], reason: str) -> None:
@@ -93,6 +93,9 @@ def _prepare_generated(options: argparse.Namespace) -> Corpus:
     if options.source is not None:
         raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
     _refuse_flags(options, _RECORDED, "recordings; a generated corpus has what --view and --fingers show.")
+    view = options.view or "body"
+    if options.pose and options.pose not in view_poses(view):
+        raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
     return prepare_talker(
         options.out,
         talker_options(options),
@@ -335,7 +338,7 @@ def _pins(options: argparse.Namespace) -> Pins | None:
             if getattr(options, name) is not None:
                 raise InputError(f"--{name.replace('_', '-')} is for --pin; name a clip and a second.")
         return None
-    blend = 0.5 if options.pin_blend is None else options.pin_blend
+    blend = 0.75 if options.pin_blend is None else options.pin_blend
     shared = 0.0 if options.pin_shared is None else options.pin_shared
     corpus = None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
     return Pins(tuple(options.pin), blend, shared, corpus)

@@ -32,7 +32,8 @@ def prepare_talker(
     """A generated corpus; the same for any number of workers.
 
     Args:
-        features: how audio is looked at; rate and poses are those of the options.
+        features: how audio is looked at, and how rotations are written down where the view has them; the rate and
+            other poses are those of the options.
         workers: processes that generate; one for every core if None.
         on_demand: store only a first part, and leave the rest of the training recordings to be generated in training.
 
@@ -40,7 +41,9 @@ def prepare_talker(
         InputError: the folder exists, or there are too few minutes.
         Interrupted: by Ctrl-C; the same call goes on.
     """
-    features = replace(features or Features(), fps=options.fps, pose=find_view(options.view).pose, joints="all")
+    features, poses = features or Features(), view_poses(options.view)
+    pose = features.pose if features.pose in poses else poses[0]
+    features = replace(features, fps=options.fps, pose=pose, joints="all")
     roles, parts, recipe = options.roles(), {}, options.recipe()
     if on_demand is None:
         recipe["roles"] = roles
@@ -53,6 +56,12 @@ def prepare_talker(
     items = [Item(role["name"], ()) for role in roles]
     make = partial(_make, "generating", generate, roles, workers)
     return prepare_corpus(out, items, make, Plan(features, recipe, options.seed, parts), say)
+
+
+def view_poses(view: str) -> tuple[str, ...]:
+    """How the poses of a view of the talker can be written down, the usual way first."""
+    pose = find_view(view).pose
+    return ("6d", "exponential") if pose == "6d" else (pose,)
 
 
 def prepare_data_set(

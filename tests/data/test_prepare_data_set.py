@@ -198,6 +198,6 @@ def test_settings_that_do_not_exist(tmp_path, folder, capsys):
     ):
         assert main(["prepare", "folder", str(folder), "--out", str(tmp_path / "c"), "--workers", "1", *flags]) == 2
         assert message in capsys.readouterr().err
-    assert main(["prepare", "talker", "--out", str(tmp_path / "c"), "--pose", "6d"]) == 2
-    assert "--pose is for recordings" in capsys.readouterr().err
+    assert main(["prepare", "talker", "--out", str(tmp_path / "c"), "--joints", "all"]) == 2
+    assert "--joints is for recordings" in capsys.readouterr().err
     assert MelConfig().width == 64

@@ -8,6 +8,8 @@ from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.make import prepare_talker
+from a2g_jax.data.representation import rotations_from_rows
+from a2g_jax.data.settings import find_features
 from a2g_jax.data.talker import recordings
 
 
@@ -75,3 +77,20 @@ def test_refusals(tmp_path, monkeypatch, capsys, arguments, message):
     assert status == 2
     assert message in line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_rotations_as_exponential_maps(tmp_path, short):
+    """What the flow's settings ask for; the same motion as in 6D."""
+    options = TalkerOptions(minutes=0.2, seed=3, fps=20.0)
+    maps = prepare_talker(tmp_path / "maps", options, find_features("stylized-flow"), workers=1)
+    six = prepare_talker(tmp_path / "six", options, workers=1)
+    assert (maps.representation, six.representation) == ("exponential", "6d")
+    np.testing.assert_allclose(
+        rotations_from_rows(maps.pose[:50], "exponential"), rotations_from_rows(six.pose[:50], "6d"), atol=1e-5
+    )
+
+
+def test_poses_that_a_view_does_not_show(tmp_path, capsys):
+    command = ["prepare", "talker", "--out", str(tmp_path / "corpus"), "--minutes", "1"]
+    assert main([*command, "--pose", "keypoints"]) == 2
+    assert "the view 'body' shows 6d or exponential" in capsys.readouterr().err
