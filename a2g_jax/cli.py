@@ -10,6 +10,7 @@ from a2g_jax import __version__
 from a2g_jax.errors import A2GError, Interrupted
 from a2g_jax.evaluation import arguments as evaluation
 from a2g_jax.generation import retarget_arguments as retargeting
+from a2g_jax.generation import style_arguments as styling
 from a2g_jax.inspection import arguments as inspection
 
 #: Names of the models; the registry itself is imported late, because it costs seconds.
@@ -168,7 +169,12 @@ def make_parser() -> argparse.ArgumentParser:
     train.add_argument("model", choices=MODEL_NAMES)
     train.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
     train.add_argument("--out", metavar="RUN", help="folder of the run")
-    train.add_argument("--preset", default="tiny", help="tiny: minutes on 2 cores; paper: as published (default: tiny)")
+    train.add_argument(
+        "--preset",
+        default="tiny",
+        help="tiny: minutes on 2 cores; paper: as published; of stylized_flow also ted, moglow and moglow_styled"
+        " (default: tiny)",
+    )
     train.add_argument(
         "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"
     )
@@ -206,6 +212,13 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="EDIT",
         help="of DCT bands, such as 'specific scale 0:10 1.5'; may be repeated",
     )
+    generate.add_argument(
+        "--control",
+        action="append",
+        metavar="NAME=PERCENTILE",
+        help="how high, fast or wide the hands move, such as height=90, or over seconds 'height=10@0 90@5', in"
+        " percentiles of the training clips, for runs with --style-controls; may be repeated",
+    )
     pin = generate.add_argument_group("clips on the timeline")
     pin.add_argument(
         "--pin",
@@ -227,6 +240,7 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="CORPUS",
         help="whose 99th percentile of jerk seams are held against (default: the clip's)",
     )
+    styling.add_arguments(generate, _number(float, 0.0, 1.0, "a number from 0 to 1"))
     sampling(generate)
     return parser
 

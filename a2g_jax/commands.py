@@ -26,13 +26,14 @@ from a2g_jax.generation.deliver import check_formats, deliver
 from a2g_jax.generation.deliver_talk import check_talk_formats, deliver_talk
 from a2g_jax.generation.pin_report import describe
 from a2g_jax.generation.pinned import Pins
+from a2g_jax.generation.styled import Styling, styling_of
 from a2g_jax.generation.talk_request import TalkRequest, corpus_request
 from a2g_jax.inspection import command as inspect_command
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.files import read_json
 from a2g_jax.models import find_model
 from a2g_jax.progress import progress_bar
-from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig
+from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig, training_preset
 from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, demo_run, load_run
@@ -200,7 +201,8 @@ def run_train(options: argparse.Namespace, extra: list[str]) -> None:
     entry = find_model(options.model)
     if options.preset not in entry.presets:
         raise InputError(f"{options.model} has no preset {options.preset!r}; there are: {', '.join(entry.presets)}.")
-    model, training = parse_settings(extra, entry.presets[options.preset], TRAIN_PRESETS[options.preset])
+    published = training_preset(options.model, options.preset)
+    model, training = parse_settings(extra, entry.presets[options.preset], published)
     if options.settings:
         for owner in (model, training):
             print(f"# {type(owner).__name__}")
@@ -285,11 +287,14 @@ def run_talk(options: argparse.Namespace, _extra: list[str]) -> None:
 def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g generate``."""
     check_formats(options.formats)
+    styling = styling_of(options)
     _cache_compilations()
-    run = _edited(demo_run() if options.run == "demo" else load_run(options.run), options)
+    run = _controlled(_edited(demo_run() if options.run == "demo" else load_run(options.run), options), options)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
     pins = _pins(options)
-    _generate(run, audio, options, Path(options.audio).name, pins=pins)
+    _generate(run, audio, options, Path(options.audio).name, pins=pins, styling=styling)
+    for note in () if styling is None else styling.notes:
+        print(note)
     if pins is not None:
         for sample, rows in enumerate(read_json(Path(options.out) / "pins.json")):
             for row in rows:
@@ -305,6 +310,20 @@ def _edited(run: Run, options: argparse.Namespace) -> Run:
     if not hasattr(run.config.model_config, "edits"):
         raise InputError(f"{options.run}: is a run of {run.config.model}, whose codes have no DCT bands to edit.")
     settings = dataclasses.replace(run.config.model_config, edits=tuple(edits))
+    return dataclasses.replace(run, config=dataclasses.replace(run.config, model_config=settings))
+
+
+def _controlled(run: Run, options: argparse.Namespace) -> Run:
+    """The run with the style controls that the flags ask for."""
+    if not options.control:
+        return run
+    settings = run.config.model_config
+    if not getattr(settings, "style_controls", ()):
+        raise InputError(
+            f"--control {options.control[0]!r}: {options.run} was trained without style controls; train one with"
+            " 'a2g train stylized_flow --style-controls height,speed,radius'."
+        )
+    settings = dataclasses.replace(settings, control_curves=tuple(options.control))
     return dataclasses.replace(run, config=dataclasses.replace(run.config, model_config=settings))
 
 
@@ -345,7 +364,13 @@ def _pins(options: argparse.Namespace) -> Pins | None:
 
 
 def _generate(
-    run: Run, audio: Any, options: argparse.Namespace, title: str, words: Any = (), pins: Pins | None = None
+    run: Run,
+    audio: Any,
+    options: argparse.Namespace,
+    title: str,
+    words: Any = (),
+    pins: Pins | None = None,
+    styling: Styling | None = None,
 ) -> None:
     with progress_bar(options.samples, "generating", "motion") as bar:
         written = deliver(
@@ -358,6 +383,7 @@ def _generate(
             title=title,
             words=words,
             pins=pins,
+            styling=styling,
             report=lambda done: bar.update(done - bar.n),
         )
     kinds = ", ".join(f"{count} {kind}" for kind, count in written.items())

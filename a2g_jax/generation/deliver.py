@@ -12,6 +12,7 @@ from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.generation.generate import Generator
 from a2g_jax.generation.pinned import Pins
+from a2g_jax.generation.styled import Styling
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.npz import write_motion_npz
@@ -48,6 +49,7 @@ def deliver(
     title: str,
     words: Sequence[Word] = (),
     pins: Pins | None = None,
+    styling: Styling | None = None,
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
     """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``; with pins also ``pins.json``.
@@ -56,20 +58,23 @@ def deliver(
         audio: mono, at the run's sample rate.
         formats: comma-separated; see :func:`check_formats`.
         title: what was spoken, for the page's heading.
-        pins: clips that are pinned to moments of every sample.
+        pins: clips that are pinned to moments of every sample; not with ``styling``.
+        styling: clips whose style every sample takes on, or that it goes on from.
         report: called with the number of samples done.
 
     Returns:
         How many files of each format were written.
 
     Raises:
-        InputError: unknown format, a folder that cannot be used, audio shorter than a frame, or too large a page.
+        InputError: unknown format, a folder that cannot be used, audio shorter than a frame, too large a page, or clips
+            that cannot be used.
     """
     from a2g_jax.viz.player import Figure, write_page
 
     kinds = check_formats(formats)
     generator = Generator(run)
     pinned = None if pins is None else pins.place(run, generator.frames(audio))
+    styled = None if styling is None else styling.place(run, samples)
     frames, joints = generator.frames(audio), run.config.skeleton.joints
     if "html" in kinds and samples * frames * joints > _PAGE_LIMIT:
         raise InputError(
@@ -83,9 +88,12 @@ def deliver(
             old.unlink()
     figures: list[Figure] = []
     followed: list[list[dict[str, Any]]] = []
-    motions = (
-        generator.stream(audio, samples, seed) if pinned is None else pinned.stream(audio, samples, seed, followed)
-    )
+    if styled is not None:
+        motions = styled.stream(audio, samples, seed)
+    elif pinned is not None:
+        motions = pinned.stream(audio, samples, seed, followed)
+    else:
+        motions = generator.stream(audio, samples, seed)
     for number, motion in enumerate(motions):
         if "bvh" in kinds:
             write_bvh(out / f"sample_{number:02d}.bvh", motion)
@@ -103,7 +111,8 @@ def deliver(
             audio,
             run.config.mel.sample_rate,
             title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-            subtitle=f"{run.config.model}, {run.config.preset} preset, {run.steps} training steps, seed {seed}",
+            subtitle=f"{run.config.model}, {run.config.preset} preset, {run.steps} training steps, seed {seed}"
+            + ("" if styling is None else f", {styling.label}"),
             words=words,
             lanes=() if pinned is None else (pinned.lane(),),
         )

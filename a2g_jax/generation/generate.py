@@ -6,7 +6,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from a2g_jax.data.representation import rotations_from_rows
 from a2g_jax.errors import InputError
@@ -19,6 +19,9 @@ from a2g_jax.training.run import Run
 
 #: Frames that one call of a compiled function gives. One size for every audio: nothing compiles anew for a new length.
 WINDOW = 1024
+#: Samples that a model whose frames follow one another makes side by side: one reading of its weights serves all of
+#: them. Always as many, also for a single one, so that a sample does not depend on how many are asked for.
+LANES = 4
 
 
 class Generator:
@@ -48,18 +51,19 @@ class Generator:
         @jax.jit
         def sample(params, summary, key, condition, start):
             pose = draw(params, summary, key, condition, start)
-            return _valid(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW), representation)
+            return valid_rows(jax.lax.dynamic_slice_in_dim(pose, self._halo, WINDOW), representation)
 
         self._sample = sample
-        self._begin = None if model.begin is None else jax.jit(model.begin)
-        proceed = model.proceed
+        begin, proceed = model.begin, model.proceed
+        self._begin = None if begin is None else jax.jit(jax.vmap(begin, in_axes=(None, None, 0)))
 
         @jax.jit
-        def go_on(params, summary, key, condition, start, carried):
+        def go_on(params, summary, keys, condition, start, carried):
             assert proceed is not None
             cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self._halo, WINDOW), condition)
-            pose, carried = proceed(params, summary, key, cut, start + self._halo, carried)
-            return _valid(pose, representation), carried
+            lanes = jax.vmap(proceed, in_axes=(None, None, 0, None, None, 0))
+            pose, carried = lanes(params, summary, keys, cut, start + self._halo, carried)
+            return valid_rows(pose, representation), carried
 
         self._go_on = go_on
 
@@ -122,21 +126,24 @@ class Generator:
         frames = len(features)
         windows = list(self._windows(features))
         key = jax.random.key(seed)
+        if self._begin is not None:
+            yield from self._in_lanes(windows, key, samples, frames)
+            return
         for number in range(samples):
-            sample_key = jax.random.fold_in(key, number)
-            parts = list(self._parts(windows, sample_key))
+            draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
+            parts = [draw(condition, jnp.int32(start)) for start, condition in windows]
             yield np.concatenate([np.asarray(part) for part in parts])[:frames]
 
-    def _parts(self, windows, key):
-        """The motion of each window: on their own, or each going on from the one before."""
-        if self._begin is None:
-            draw = partial(self._sample, self._params, self._summary, key)
-            yield from (draw(condition, jnp.int32(start)) for start, condition in windows)
-            return
-        carried = self._begin(self._params, self._summary, key)
-        for start, condition in windows:
-            pose, carried = self._go_on(self._params, self._summary, key, condition, jnp.int32(start), carried)
-            yield pose
+    def _in_lanes(self, windows, key, samples: int, frames: int):
+        """Motions whose windows go on from one another, several at a time."""
+        assert self._begin is not None
+        for first in range(0, samples, LANES):
+            keys = jax.vmap(lambda number: jax.random.fold_in(key, number))(first + jnp.arange(LANES))
+            carried, parts = self._begin(self._params, self._summary, keys), []
+            for start, condition in windows:
+                pose, carried = self._go_on(self._params, self._summary, keys, condition, jnp.int32(start), carried)
+                parts.append(np.asarray(pose))
+            yield from np.concatenate(parts, axis=1)[: samples - first, :frames]
 
     def _windows(self, features: Float[np.ndarray, "T bands"]):
         """First frame (context included) and encoded audio of each window."""
@@ -151,7 +158,7 @@ class Generator:
             yield start - self._halo, self._condition(self._params, window)
 
 
-def _valid(pose, representation):
+def valid_rows(pose: Float[Array, "*S R D"], representation: str) -> Float[Array, "*S R D"]:
     """The poses that a model's raw output stands for."""
     if representation == "6d":
         return matrix_to_6d(matrix_from_6d(pose))

@@ -81,12 +81,7 @@ def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray
             or one shorter than what is asked of it.
     """
     path, start, length = parse_pin(text)
-    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
-    if not same_rest(motion.skeleton, skeleton):
-        source = find_rig(motion, name=str(path))
-        motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
-    # Bones of other lengths on the same joints need no retargeting: the codes are of rotations alone.
-    motion = resample(replace(motion, skeleton=skeleton), fps)
+    motion = read_on_skeleton(path, skeleton, fps)
     if length is not None:
         frames = round(length * fps)
         if frames > motion.frames:
@@ -98,6 +93,32 @@ def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray
     if facing is not None:
         motion, turned = face(motion, facing)
     return Pin(str(path), start, motion, turned)
+
+
+def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
+    """Any humanoid BVH, or an NPZ that this package wrote, on a run's skeleton at its frame rate.
+
+    Raises:
+        InputError: a file that cannot be read, or a rig that is not understood.
+    """
+    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
+    return on_skeleton(motion, skeleton, fps, str(path))
+
+
+def on_skeleton(motion: Motion, skeleton: Skeleton, fps: float, name: str) -> Motion:
+    """The rotations of a humanoid motion on another skeleton, at another rate.
+
+    Args:
+        name: of the motion, for messages.
+
+    Raises:
+        InputError: a rig that is not understood.
+    """
+    if not same_rest(motion.skeleton, skeleton):
+        source = find_rig(motion, name=name)
+        motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
+    # Bones of other lengths on the same joints need no retargeting: models see rotations alone.
+    return resample(replace(motion, skeleton=skeleton), fps)
 
 
 def same_rest(first: Skeleton, second: Skeleton) -> bool:

@@ -19,7 +19,7 @@ class Report:
 
         {"format": "a2g_jax inspection", "version": 1,
          "path": ..., "kind": "bvh" | "audio" | "transcript" | "motion npz" | "smplx npz" | "npz" | "pair" | "folder"
-                              | "corpus" | "run",
+                              | "corpus" | "run" | "score",
          "facts": {section: {name: number, text, list or further names}},
          "findings": [{"severity": "warning" | "info", "code", "message", "mend", "value": number or null,
                        "place": {"path", "recording", "joint", "frame", "seconds"} as far as they apply}]}

@@ -93,3 +93,11 @@ class Model(NamedTuple):
 
     Such a model's condition has time as the leading axis of every array. ``sample`` is ``proceed`` after ``begin``.
     """
+    score: Callable[..., Array] | None = None
+    """Of models that tell densities: ``score(params, audio (B, T, bands), pose (B, T, R, D), clean=None) -> (B, N)``.
+
+    Log-likelihood in nats of each of the N frames that have all they are told of around them, given the poses before
+    it and the audio, as a density of z-scores; with the treatment of noise that the model documents. The first scored
+    frame is ``history_frames`` of the model's settings, and after the last there are ``lookahead_frames``. ``clean`` is
+    the poses before noise was added to them, if it was: what is measured on poses is measured on those.
+    """

@@ -11,7 +11,7 @@ and what the two codes carry when they are exchanged between motions.
 import json
 from typing import Any
 
-from experiments.audio2gestures.common import RESULTS, records
+from experiments.tables.records import records, results
 
 BASELINE, FULL = "baseline", "+ diversity loss"
 #: Rows that show what keeps the shared code alive.
@@ -25,7 +25,11 @@ LISTENING = (
 
 def of(variant: str, steps: int) -> list[dict[str, Any]]:
     """Records of a row of Table 2."""
-    return [record for record in records("table2") if record["variant"] == variant and record["steps"] == steps]
+    return [
+        record
+        for record in records("audio2gestures/table2")
+        if record["variant"] == variant and record["steps"] == steps
+    ]
 
 
 def listening(record: dict[str, Any]) -> str:
@@ -47,11 +51,13 @@ def _interval(value: dict[str, Any]) -> str:
 
 def page() -> str:
     """Markdown."""
-    steps = max((record["steps"] for record in records("table2") if record["variant"] == FULL), default=0)
+    steps = max(
+        (record["steps"] for record in records("audio2gestures/table2") if record["variant"] == FULL), default=0
+    )
     truth = next(
         (
             record["scores"]["multimodality"]["mean"]
-            for record in records("table2")
+            for record in records("audio2gestures/table2")
             if record["variant"] == "another right motion"
         ),
         None,
@@ -71,7 +77,7 @@ def page() -> str:
         for record in of(name, steps):
             if record.get("audit"):
                 lines.append(f"| {name} | {record['seed']} | {listening(record)} |")
-    path = RESULTS / "codes.json"
+    path = results("audio2gestures") / "codes.json"
     if path.exists():
         lines += ["", "## Codes exchanged between two motions", ""]
         lines += ["| run | pairs | the hand is I's | strokes are S's | strokes are I's | a stranger's |"]
@@ -90,5 +96,5 @@ def page() -> str:
 
 if __name__ == "__main__":
     text = page()
-    (RESULTS / "claims.md").write_text(text, encoding="utf-8")
+    (results("audio2gestures") / "claims.md").write_text(text, encoding="utf-8")
     print(text)

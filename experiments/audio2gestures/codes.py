@@ -22,7 +22,7 @@ from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement, speed_peaks
 from a2g_jax.models.audio2gestures.codec import Networks
 from a2g_jax.training.run import Run, demo_run, load_run
-from experiments.audio2gestures.common import RESULTS
+from experiments.tables.records import results
 
 FRAMES = 128
 #: Share by which one wrist must move more than the other.
@@ -110,7 +110,10 @@ def main() -> None:
         run = demo_run() if name == "demo" else load_run(name)
         figures[Path(name).name] = swap(run, corpus, options.seed)
         print(Path(name).name, figures[Path(name).name])
-    write_json(RESULTS / "codes.json", {"corpus": corpus.fingerprint[:16], "seed": options.seed, "runs": figures})
+    write_json(
+        results("audio2gestures") / "codes.json",
+        {"corpus": corpus.fingerprint[:16], "seed": options.seed, "runs": figures},
+    )
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.training.run import Run, demo_run, load_run
-from experiments.audio2gestures.common import RESULTS
+from experiments.tables.records import results
 
 SECONDS = 12.0
 #: Seconds of blending, and share of the clip's own shared code.
@@ -94,7 +94,10 @@ def main() -> None:
     }
     for name, row in figures.items():
         print(name, row)
-    write_json(RESULTS / "pins.json", {"corpus": corpus.fingerprint[:16], "seed": options.seed, "settings": figures})
+    write_json(
+        results("audio2gestures") / "pins.json",
+        {"corpus": corpus.fingerprint[:16], "seed": options.seed, "settings": figures},
+    )
 
 
 if __name__ == "__main__":

@@ -12,8 +12,10 @@ recordings stay where ``--runs`` puts them.
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.audio2gestures.common import BASE, Claim, Variant, arguments, setting
-from experiments.audio2gestures.tables import compute, draw
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import compute, draw
+from experiments.tables.runs import Variant, arguments, setting
 
 VARIANTS = {
     "Audio2Gestures without split": Variant({**BASE, "split": False, "sample_codes": True}),
@@ -49,8 +51,8 @@ def main() -> None:
         corpus = getattr(options, name)
         if corpus is not None:
             where = replace(setting(options), corpus=corpus, features=None)
-            compute(f"real_{name}", VARIANTS, where, options.only.split(",") if options.only else None)
-        draw(f"real_{name}", f"A take of {name.upper()}", VARIANTS, CLAIMS, {})
+            compute(f"audio2gestures/real_{name}", VARIANTS, where, options.only.split(",") if options.only else None)
+        draw(f"audio2gestures/real_{name}", f"A take of {name.upper()}", VARIANTS, CLAIMS, {})
 
 
 if __name__ == "__main__":

@@ -10,8 +10,10 @@ the tables are drawn from the records that there are.
 from dataclasses import replace
 from pathlib import Path
 
-from experiments.audio2gestures.common import BASE, Claim, Variant, arguments, setting
-from experiments.audio2gestures.tables import compute, draw
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import compute, draw
+from experiments.tables.runs import Variant, arguments, setting
 
 OURS, WITHOUT_GAN, WITH_GAN = "Audio2Gestures", "Speech2Gesture without GAN", "Speech2Gesture"
 
@@ -27,9 +29,9 @@ def _rows(clip_frames: int) -> dict[str, Variant]:
 
 #: By name of the table: title, rows, claims, the paper's figures.
 TABLES = {
-    "table1_3d": (
+    "audio2gestures/table1_3d": (
         "Table 1, 3D",
-        _rows(128),
+        _rows(64),
         (
             Claim("without GAN, position L1 is about ours or lower", WITHOUT_GAN, OURS, "position_l1", -1),
             Claim("the GAN worsens position L1", WITH_GAN, WITHOUT_GAN, "position_l1", 1),
@@ -44,7 +46,7 @@ TABLES = {
             "Audio2Gestures": "7.84 (7.65), 0.82 (0.83), 6.32, multimodality 4.11",
         },
     ),
-    "table1_2d": (
+    "audio2gestures/table1_2d": (
         "Table 1, 2D",
         _rows(64),
         (
@@ -71,8 +73,8 @@ def main() -> None:
     options = parser.parse_args()
     where = setting(options)
     given = {
-        "table1_3d": where,
-        "table1_2d": replace(where, corpus=options.corpus_2d, features=options.features_2d),
+        "audio2gestures/table1_3d": where,
+        "audio2gestures/table1_2d": replace(where, corpus=options.corpus_2d, features=options.features_2d),
     }
     only = options.only.split(",") if options.only else None
     for name, (title, rows, claims, paper) in TABLES.items():

@@ -5,8 +5,10 @@
 Without a corpus the table is drawn from the records that there are.
 """
 
-from experiments.audio2gestures.common import BASE, Claim, Variant
-from experiments.audio2gestures.tables import make
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import make
+from experiments.tables.runs import Variant
 
 #: Without the weights that the authors' code puts on sampled motions beside the paper's relaxed loss.
 PAPER_LOSSES = {"sampled_rotation_weight": 0.0, "sampled_speed_weight": 0.0}
@@ -47,4 +49,6 @@ PAPER = {
 
 
 if __name__ == "__main__":
-    make("table2", "Table 2: the components of Audio2Gestures one after another", VARIANTS, CLAIMS, PAPER)
+    make(
+        "audio2gestures/table2", "Table 2: the components of Audio2Gestures one after another", VARIANTS, CLAIMS, PAPER
+    )

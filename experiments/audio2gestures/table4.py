@@ -5,8 +5,10 @@
 The paper does not give the losses' weights. Ours make each about as large as the position loss early in training.
 """
 
-from experiments.audio2gestures.common import BASE, Claim, Variant
-from experiments.audio2gestures.tables import make
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import make
+from experiments.tables.runs import Variant
 
 STFT, SSIM, LPIPS = {"stft_weight": 0.05}, {"ssim_weight": 0.1}, {"lpips_weight": 0.002}
 
@@ -40,4 +42,4 @@ PAPER = {
 }
 
 if __name__ == "__main__":
-    make("table4", "Table 4: structured and perceptual training losses", VARIANTS, CLAIMS, PAPER)
+    make("audio2gestures/table4", "Table 4: structured and perceptual training losses", VARIANTS, CLAIMS, PAPER)

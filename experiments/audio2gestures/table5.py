@@ -2,11 +2,13 @@
 
     python -m experiments.audio2gestures.table5 --corpus CORPUS --features RUN [--budget MINUTES]
 
-The paper trains the Transformer on sequences of 512 frames; here all rows have the same clips of 128.
+The paper trains the Transformer on sequences of 512 frames; here all rows have the same clips of 64.
 """
 
-from experiments.audio2gestures.common import BASE, Claim, Variant
-from experiments.audio2gestures.tables import make
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import make
+from experiments.tables.runs import Variant
 
 VARIANTS = {
     "baseline (TCN, no split)": Variant({**BASE, "split": False, "sample_codes": True}),
@@ -39,4 +41,4 @@ PAPER = {
 }
 
 if __name__ == "__main__":
-    make("table5", "Table 5: backbones of the encoders", VARIANTS, CLAIMS, PAPER)
+    make("audio2gestures/table5", "Table 5: backbones of the encoders", VARIANTS, CLAIMS, PAPER)

@@ -5,12 +5,14 @@
 One run with a latent space of DCT bands for each seed; every edit is made of it in generation.
 """
 
-from experiments.audio2gestures.common import BASE, Claim, Variant
-from experiments.audio2gestures.tables import make
+from experiments.audio2gestures.settings import BASE
+from experiments.tables.claims import Claim
+from experiments.tables.markdown import make
+from experiments.tables.runs import Variant
 
 DCT = "A2G with DCT"
-#: Bands have no order in time, so their noise has no memory either.
-_SETTINGS = {**BASE, "latent": "dct", "noise_frames": 1}
+#: Bands have no order in time, so their noise has no memory either; 128 points take clips of 128 frames.
+_SETTINGS = {**BASE, "latent": "dct", "noise_frames": 1, "clip_frames": 128}
 
 
 def _edited(*edits: str) -> Variant:
@@ -52,4 +54,4 @@ PAPER = {
 }
 
 if __name__ == "__main__":
-    make("table6", "Table 6: edits of latent DCT bands", VARIANTS, CLAIMS, PAPER)
+    make("audio2gestures/table6", "Table 6: edits of latent DCT bands", VARIANTS, CLAIMS, PAPER)

@@ -1,8 +1,9 @@
 """Settings of the stylized flow and its presets."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from a2g_jax.errors import InputError
+from a2g_jax.models.stylized_flow.controls import SCALES, parse_curves
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,11 @@ class StylizedFlowConfig:
     bound: the likelihood grows by fitting them alone, and its gradient with it. The noise bounds it; the papers name
     none.
     """
+    predictor: bool = False
+    """Whether the first layer subtracts a linear extrapolation of each channel and whitens what is left, fitted to the
+    first batch: see :mod:`a2g_jax.nn.flow.predictor`. The published flows have none; without it a small flow of smooth
+    motion stays far behind a linear one for thousands of steps. It sees all poses whatever ``frame_dropout`` hides.
+    """
     freedom: float = 50.0
     """Degrees of freedom of the Student-t prior; 0 for a normal one (MoGlow)."""
     global_channels: int = 32
@@ -48,10 +54,19 @@ class StylizedFlowConfig:
     """Of the L1 distance of poses that the reverse pass makes; 0 for none."""
     perceptual_weight: float = 0.0
     """Of the gesture perceptual loss (Eq. 8), 0.1 in the paper; needs ``a2g train --features RUN``."""
+    style_controls: tuple[str, ...] = ()
+    """What a frame is told of how the hands move: any of height, left_height, right_height, speed and radius.
+
+    Averages of the clip's own poses over four seconds, never hidden. The likelihood is then that of poses given their
+    averages, which compares with no model that is not told them.
+    """
     clip_frames: int = 120
     """Frames in a training clip; the first ``history_frames`` and the last ``lookahead_frames`` are only told of."""
     temperature: float = 1.0
     """In generation, scale of the latents; 1 is what training saw."""
+    control_curves: tuple[str, ...] = ()
+    """In generation, what is asked of the style controls, as percentiles of the training clips: ``height=90``, or over
+    seconds ``height=10@0 90@5``; 50 for those that are not named."""
 
     def __post_init__(self) -> None:
         for name in (
@@ -63,6 +78,12 @@ class StylizedFlowConfig:
         for name in ("lookahead_frames", "global_channels"):
             if getattr(self, name) < 0:
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
+        for name in self.style_controls:
+            if name not in SCALES or self.style_controls.count(name) > 1:
+                raise InputError(f"--style-controls: expected any of {', '.join(SCALES)}, each once; got {name!r}.")
+        parse_curves(self.control_curves, self.style_controls)
+        if self.predictor and self.history_frames < 2:
+            raise InputError(f"--predictor: needs --history-frames 2 or more; got {self.history_frames}.")
         if self.cell not in ("gru", "lstm"):
             raise InputError(f"--cell: expected gru or lstm; got {self.cell!r}.")
         for name in ("frame_dropout", "reverse_share"):
@@ -90,10 +111,13 @@ class StylizedFlowConfig:
         return self.reverse_share > 0 and (self.reconstruction_weight > 0 or self.perceptual_weight > 0)
 
 
+_MOGLOW = StylizedFlowConfig(hidden=512, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0)
+
 PRESETS: dict[str, StylizedFlowConfig] = {
     "paper": StylizedFlowConfig(perceptual_weight=0.1),
     "ted": StylizedFlowConfig(history_frames=12, lookahead_frames=0, clip_frames=42, perceptual_weight=0.1),
-    "moglow": StylizedFlowConfig(hidden=512, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0),
+    "moglow": _MOGLOW,
+    "moglow_styled": replace(_MOGLOW, style_controls=("height", "speed", "radius")),
     "tiny": StylizedFlowConfig(
         flow_steps=8,
         hidden=64,
@@ -101,9 +125,16 @@ PRESETS: dict[str, StylizedFlowConfig] = {
         history_frames=5,
         lookahead_frames=10,
         clip_frames=64,
+        predictor=True,
         global_channels=16,
         encoder_channels=32,
         encoder_blocks=1,
         embedding_channels=16,
     ),
 }
+"""``paper`` and ``ted``: the stylized flow on Trinity and on TED. ``moglow``: the settings that MoGlow's authors prefer
+for StyleGestures, apart from our ``input_noise``, which theirs lacks (``--input-noise 0``). ``moglow_styled``: the same
+with style controls, all in one model, and the height that of both hands; StyleGestures trains one model for each
+control, and its height is that of the right hand (``--style-controls right_height``). How each is trained:
+:data:`a2g_jax.training.config.MODEL_PRESETS`.
+"""

@@ -12,8 +12,10 @@ from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
 from a2g_jax.models.base import Batch, Data, Model, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import hidden
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.controls import asked, check_controls, parse_curves
+from a2g_jax.models.stylized_flow.likelihood import log_likelihood, make_score
 from a2g_jax.models.stylized_flow.networks import Carried, Heard, Networks, Told
-from a2g_jax.nn.flow.priors import log_prob, spread
+from a2g_jax.nn.flow.priors import spread
 from a2g_jax.nn.noise import frame_normal
 
 
@@ -21,17 +23,22 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
     """The flow for a corpus's poses; see :class:`a2g_jax.models.base.Model` for its parts.
 
     Raises:
-        InputError: the perceptual loss has no feature network.
+        InputError: the perceptual loss has no feature network, or poses tell no style controls.
     """
+    check_controls(config.style_controls, data)
     if config.perceptual_weight > 0 and config.reverse_share > 0 and data.perceptual is None:
         raise InputError("--perceptual-weight: needs a feature network; add --features RUN, or set it to 0.")
     networks = Networks(config, data)
+    curves = parse_curves(config.control_curves, config.style_controls)
     likelihood, reverse = _likelihood(networks), _reverse(networks)
 
     def noisy(key: Key[Array, ""], flat: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
         if config.input_noise == 0:
             return flat
-        return flat + config.input_noise * jax.random.normal(key, flat.shape, flat.dtype)
+        # Drawn once: XLA would draw it anew, in code of its own, for each of the many windows that see it, and compile
+        # for minutes.
+        noise = jax.lax.optimization_barrier(jax.random.normal(key, flat.shape, flat.dtype))
+        return flat + config.input_noise * noise
 
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
@@ -42,7 +49,8 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
         flat = noisy(noise_key, networks.flat(batch.pose))
         clips, frames = len(flat), networks.inner(flat).shape[1]
         seen = hidden(hide_key, config.frame_dropout, (clips, frames, config.history_frames))
-        told = networks.told(params, batch.audio, flat, seen)
+        # Style controls are those of the poses without noise, which would be speed.
+        told = networks.told(params, batch.audio, flat, seen, networks.controls(batch.pose))
         bits, terms = likelihood(params, flat, told)
         if not config.reverses:
             return bits, terms
@@ -62,19 +70,24 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
         """Bits per frame with every pose seen, through the noise that training has."""
         del step
         flat = noisy(key, networks.flat(batch.pose))
-        return likelihood(params, flat, networks.told(params, batch.audio, flat))
+        return likelihood(
+            params, flat, networks.told(params, batch.audio, flat, controls=networks.controls(batch.pose))
+        )
 
     def warm_start(params: Params, batch: Batch) -> Params:
         """Actnorms set from the first batch, as likelihoods see it."""
         flat = noisy(jax.random.key(0), networks.flat(batch.pose))
-        return networks.fitted(params, batch.audio, flat)
+        return networks.fitted(params, batch.audio, flat, networks.controls(batch.pose))
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """Mean over time of the latents of every clip."""
+        """Mean over time of the latents of every clip, and of its style controls where there are any."""
         del key
         flat = networks.flat(batch.pose)
         z, _ = networks.latents(params, networks.inner(flat), networks.told(params, batch.audio, flat))
-        return {"latent_mean": jnp.mean(z, axis=1)}
+        means = {"latent_mean": jnp.mean(z, axis=1)}
+        if config.style_controls:
+            means["control_mean"] = jnp.mean(networks.controls(batch.pose), axis=1)
+        return means
 
     def condition(params: Params, audio: Float[Array, "T bands"]) -> Heard:
         """All that comes of the audio alone."""
@@ -89,7 +102,10 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
         params: Params, summary: Summary, key: Key[Array, ""], heard: Heard, start: Int[Array, ""], carried: Carried
     ) -> tuple[Float[Array, "T R D"], Carried]:
         """The next frames of a motion, and what those after them need."""
-        del summary
+        if curves:
+            frames = heard.embedding.shape[0]
+            controls = asked(curves, jnp.asarray(summary["control_mean"]), start, frames, data.fps)
+            heard = networks.steered(params, heard, controls)
         z = draw_latents(config, key, start, heard.embedding.shape[0], networks.channels)
         flat, carried = networks.proceed(params, z[:, None], heard, carried)
         return networks.pose(jnp.swapaxes(flat, 0, 1))[0], carried
@@ -123,6 +139,7 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
         warm_start,
         begin,
         proceed,
+        score=make_score(networks),
     )
 
 
@@ -143,8 +160,8 @@ def _likelihood(networks: Networks) -> Any:
     """Bits per frame of the frames of clips."""
 
     def bits(params: Params, flat: Float[Array, "B T C"], told: Told) -> tuple[Float[Array, ""], dict[str, Array]]:
-        z, log_det = networks.latents(params, networks.inner(flat), told)
-        per_frame = -jnp.mean(log_prob(z, networks.config.freedom) + log_det) / math.log(2.0)
+        log_density, z = log_likelihood(networks, params, flat, told)
+        per_frame = -jnp.mean(log_density) / math.log(2.0)
         return per_frame, {"bits_per_dim": per_frame / networks.channels, "latent_std": jnp.std(z)}
 
     return bits

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float, Key
 from a2g_jax.models.base import Data, Params
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.controls import measure, scaled
 from a2g_jax.models.stylized_flow.global_encoder import Fusion, WindowEncoder
 from a2g_jax.nn.flow.coupling import Shape
 from a2g_jax.nn.flow.glow import (
@@ -21,6 +22,16 @@ from a2g_jax.nn.flow.glow import (
     init_glow,
     prepare,
     project,
+    project_last,
+)
+from a2g_jax.nn.flow.predictor import (
+    as_steps,
+    fit_predictor,
+    init_predictor,
+    inverse_whitening,
+    predictor,
+    predictor_inverse,
+    predictor_log_det,
 )
 
 
@@ -30,7 +41,9 @@ class Told(NamedTuple):
     history: Float[Array, "B N H"]
     """Poses before them, and the global feature."""
     known: Float[Array, "B N D"]
-    """Audio around them."""
+    """Audio around them, and style controls."""
+    poses: Float[Array, "B N frames C"]
+    """Poses before them with none hidden, for the linear first layer."""
 
 
 class Heard(NamedTuple):
@@ -61,7 +74,7 @@ class Networks:
         self.shape = Shape(
             self.channels,
             config.history_frames * self.channels + config.global_channels,
-            config.audio_frames * data.audio_bands,
+            config.audio_frames * data.audio_bands + len(config.style_controls),
             config.hidden,
             config.layers,
             config.cell,
@@ -73,7 +86,9 @@ class Networks:
     def init(self, key: Key[Array, ""]) -> Params:
         """Before the actnorms are fitted to data."""
         config, keys = self.config, jax.random.split(key, 4)
-        params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
+        params: Params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
+        if config.predictor:
+            params["predictor"] = init_predictor(config.history_frames, self.channels)
         if config.global_channels:
             both = jnp.zeros((1, 1, 2 * config.embedding_channels))
             params["global_encoder"] = {
@@ -102,14 +117,18 @@ class Networks:
         audio: Float[Array, "B T bands"],
         flat: Float[Array, "B T C"],
         seen: Array | None = None,
+        controls: Float[Array, "B T K"] | None = None,
     ) -> Told:
         """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
 
         Args:
             seen: which told poses are not hidden, (B, N, history); None for all.
+            controls: style controls of each frame, of :meth:`controls`; None for those that ``flat`` itself has.
         """
         config = self.config
-        history = pose_history(flat, config.history_frames, config.lookahead_frames)
+        before = history = pose_history(flat, config.history_frames, config.lookahead_frames)
+        if config.predictor:
+            history = as_steps(params["predictor"], before)
         if seen is not None:
             history = history * seen[..., None]
         heard = windows(audio, config.audio_frames)
@@ -117,7 +136,14 @@ class Networks:
         if config.global_channels:
             embedded = [self.embed(params, "pose", history), self.embed(params, "audio", heard)]
             poses = jnp.concatenate([poses, self.fuse(params, *embedded)], axis=-1)
-        return Told(poses, heard.reshape(*heard.shape[:2], -1))
+        if controls is None:
+            controls = self.controls(self.pose(flat))
+        known = [heard.reshape(*heard.shape[:2], -1), self.inner(scaled(self.config.style_controls, controls))]
+        return Told(poses, jnp.concatenate(known, axis=-1), before)
+
+    def controls(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T K"]:
+        """Style controls of every frame of clips, metres and m/s; K is 0 without any."""
+        return measure(self.config.style_controls, self.data, pose)
 
     def embed(self, params: Params, name: str, stretches: Float[Array, "B N T C"]) -> Float[Array, "B N E"]:
         """Embedding of each stretch by one of the two networks of the global encoder."""
@@ -140,27 +166,50 @@ class Networks:
         self, params: Params, x: Float[Array, "B N C"], told: Told
     ) -> tuple[Float[Array, "B N C"], Float[Array, "B N"]]:
         """Latents and log-determinants of frames."""
-        return glow(params["glow"], self.shape, x, told.history, told.known)
+        if not self.config.predictor:
+            return glow(params["glow"], self.shape, x, told.history, told.known)
+        errors = predictor(params["predictor"], x, told.poses)
+        z, log_det = glow(params["glow"], self.shape, errors, told.history, told.known)
+        return z, log_det + predictor_log_det(params["predictor"])
 
     def motion(self, params: Params, z: Float[Array, "B N C"], told: Told) -> Float[Array, "B N C"]:
         """Frames of latents, all at once, as the told poses are given."""
-        return glow_inverse(params["glow"], self.shape, z, told.history, told.known)
+        x = glow_inverse(params["glow"], self.shape, z, told.history, told.known)
+        if not self.config.predictor:
+            return x
+        return predictor_inverse(params["predictor"], x, told.poses, inverse_whitening(params["predictor"]))
 
-    def fitted(self, params: Params, audio: Float[Array, "B T bands"], flat: Float[Array, "B T C"]) -> Params:
-        """Actnorms set from a batch."""
-        told = self.told(params, audio, flat)
-        return {**params, "glow": fit_glow(params["glow"], self.shape, self.inner(flat), told.history, told.known)}
+    def fitted(
+        self,
+        params: Params,
+        audio: Float[Array, "B T bands"],
+        flat: Float[Array, "B T C"],
+        controls: Float[Array, "B T K"] | None = None,
+    ) -> Params:
+        """Actnorms and the linear first layer set from a batch; arguments of :meth:`told`."""
+        x = self.inner(flat)
+        if self.config.predictor:
+            before = pose_history(flat, self.config.history_frames, self.config.lookahead_frames)
+            params = {**params, "predictor": fit_predictor(x, before)}
+            x = predictor(params["predictor"], x, before)
+        told = self.told(params, audio, flat, None, controls)
+        return {**params, "glow": fit_glow(params["glow"], self.shape, x, told.history, told.known)}
 
     def heard(self, params: Params, audio: Float[Array, "T bands"]) -> Heard:
-        """For every frame of an audio; before and after it there are zeros."""
+        """For every frame of an audio; before and after it there are zeros. Style controls: see :meth:`steered`."""
         config = self.config
         padded = jnp.pad(audio, ((config.history_frames, config.lookahead_frames), (0, 0)))[None]
         stretches = windows(padded, config.audio_frames)
-        known = stretches.reshape(len(audio), -1)
+        known = jnp.pad(stretches.reshape(len(audio), -1), ((0, 0), (0, len(config.style_controls))))
         embedding = jnp.zeros((len(audio), 0))
         if config.global_channels:
             embedding = self.embed(params, "audio", stretches)[0]
         return Heard(project(prepare(params["glow"]), known), embedding)
+
+    def steered(self, params: Params, heard: Heard, controls: Float[Array, "T K"]) -> Heard:
+        """The same frames told of style controls as well, metres and m/s; until then they are told zeros."""
+        share = project_last(prepare(params["glow"]), scaled(self.config.style_controls, controls))
+        return heard._replace(projected=tuple(a + b for a, b in zip(heard.projected, share, strict=True)))
 
     def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> Carried:
         """Before the first frame of so many sequences.
@@ -178,17 +227,21 @@ class Networks:
         """Frames of latents one after another, each told of those before it."""
         prepared: Prepared = prepare(params["glow"])
         count = z.shape[1]
+        unwhitening = inverse_whitening(params["predictor"]) if self.config.predictor else None
 
         def frame(carried: Carried, one):
             latent, projected, embedding = one
             history, states = carried
-            told = history.reshape(count, -1)
+            shown = as_steps(params["predictor"], history) if self.config.predictor else history
+            told = shown.reshape(count, -1)
             if self.config.global_channels:
                 audio = jnp.broadcast_to(embedding[None, None], (count, 1, embedding.shape[0]))
-                feature = self.fuse(params, self.embed(params, "pose", history[:, None]), audio)
+                feature = self.fuse(params, self.embed(params, "pose", shown[:, None]), audio)
                 told = jnp.concatenate([told, feature[:, 0]], axis=-1)
             known = tuple(jnp.broadcast_to(share[None], (count, share.shape[0])) for share in projected)
             x, states = glow_inverse_step(prepared, self.shape, latent, told, known, states)
+            if unwhitening is not None:
+                x = predictor_inverse(params["predictor"], x, history, unwhitening)
             return Carried(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), states), x
 
         after, x = jax.lax.scan(frame, carried, (z, heard.projected, heard.embedding))

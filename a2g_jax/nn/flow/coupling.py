@@ -82,6 +82,13 @@ def project_known(params: Params, known: Float[Array, "*S D"]) -> Float[Array, "
     return projected + of_channels(first["input_bias"], projected)
 
 
+def project_last_known(params: Params, last: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
+    """What the last of the known values add to :func:`project_known` of zeros in their places."""
+    kernel = params["layer_0"]["known_kernel"]
+    projected: Float[Array, "*S gates"] = last @ kernel[kernel.shape[0] - last.shape[-1] :]
+    return projected
+
+
 def start_states(shape: Shape, count: int, dtype: Any = jnp.float32) -> States:
     """Zero, as at the start of every training clip."""
     zeros = jnp.zeros((count, shape.hidden), dtype)

@@ -15,6 +15,7 @@ from a2g_jax.nn.flow.coupling import (
     coupling_inverse_step,
     init_coupling,
     project_known,
+    project_last_known,
     start_states,
 )
 from a2g_jax.nn.flow.invertible import (
@@ -127,6 +128,11 @@ def prepare(params: Params) -> Prepared:
 def project(prepared: Prepared, known: Float[Array, "*S D"]) -> tuple[Array, ...]:
     """For every step, its :func:`a2g_jax.nn.flow.coupling.project_known`."""
     return tuple(project_known(one, known) for one in prepared.couplings)
+
+
+def project_last(prepared: Prepared, last: Float[Array, "*S D"]) -> tuple[Array, ...]:
+    """For every step, its :func:`a2g_jax.nn.flow.coupling.project_last_known`."""
+    return tuple(project_last_known(one, last) for one in prepared.couplings)
 
 
 def first_states(prepared: Prepared, shape: Shape, count: int, dtype: Any = jnp.float32) -> tuple[States, ...]:

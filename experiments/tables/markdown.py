@@ -3,20 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from a2g_jax.evaluation.scores import METRICS
-from experiments.audio2gestures.common import (
-    RESULTS,
-    Claim,
+from a2g_jax.evaluation.scores import METRICS as SCORED
+from a2g_jax.evaluation.scores import Metric
+from experiments.tables.claims import Claim, best_over_seeds, judge, over_seeds
+from experiments.tables.records import path_of, records
+from experiments.tables.runs import (
+    Score,
     Setting,
     Variant,
     arguments,
     baselines,
-    best_over_seeds,
-    judge,
-    over_seeds,
-    records,
     run_table,
     setting,
+    whole_recordings,
 )
 
 #: Columns of the papers' tables, in their order.
@@ -32,6 +31,16 @@ COLUMNS = (
     "diversity",
     "multimodality",
 )
+#: Those of single papers, behind them.
+_OTHERS = ("beat_alignment", "chi", "silhouette", "chi_full", "silhouette_full", "chi_shuffled", "silhouette_shuffled")
+_T_SNE = "stylized flow, Table 3"
+METRICS = {
+    **SCORED,
+    "chi_full": Metric("CHI, full space", "", "higher", _T_SNE, 1),
+    "silhouette_full": Metric("silhouette, full space", "", "higher", _T_SNE),
+    "chi_shuffled": Metric("CHI, speakers shuffled", "", "truth", _T_SNE, 1),
+    "silhouette_shuffled": Metric("silhouette, speakers shuffled", "", "truth", _T_SNE),
+}
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
 
 
@@ -45,10 +54,17 @@ def make(
     draw(table, title, variants, claims, paper)
 
 
-def compute(table: str, variants: Mapping[str, Variant], where: Setting, only: Sequence[str] | None) -> None:
+def compute(
+    table: str,
+    variants: Mapping[str, Variant],
+    where: Setting,
+    only: Sequence[str] | None,
+    score: Score = whole_recordings,
+) -> None:
     """Train and score what is missing."""
-    baselines(table, where)
-    run_table(table, variants, where, only)
+    if score is whole_recordings:
+        baselines(table, where)
+    run_table(table, variants, where, only, score)
 
 
 def draw(
@@ -56,7 +72,7 @@ def draw(
 ) -> None:
     """Write a table's Markdown beside its records, and print it."""
     text = render(table, title, list(variants), claims, paper)
-    (RESULTS / f"{table}.md").write_text(text + "\n", encoding="utf-8")
+    path_of(table, ".md").write_text(text + "\n", encoding="utf-8")
     print(text)
 
 
@@ -66,11 +82,10 @@ def render(
     rows: Sequence[str],
     claims: Sequence[Claim],
     paper: Mapping[str, str],
-    extra: Sequence[str] = ("beat_alignment",),
 ) -> str:
     """Markdown with our table, what the paper reports and whether its claims hold here."""
     found = records(table)
-    columns = [name for name in (*COLUMNS, *extra) if any(name in record["scores"] for record in found)]
+    columns = [name for name in (*COLUMNS, *_OTHERS) if any(name in record["scores"] for record in found)]
     names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
     head = " | ".join(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in columns)
     lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]
@@ -86,7 +101,7 @@ def render(
         lines.append("")
     if paper:
         lines += [
-            "The paper's figures, on **other data** (Trinity or S2G-Ellen), another skeleton and another feature"
+            "The paper's figures, on **other data** (Trinity, S2G-Ellen or TED), another skeleton and another feature"
             " network; they cannot be compared with ours in value, only in order:",
             "",
             *(f"- {name}: {text}" for name, text in paper.items()),
@@ -118,7 +133,7 @@ def _budget(found: Sequence[Mapping[str, Any]]) -> list[str]:
     minutes = sum(record["train_seconds"] for record in trained) / 60
     corpora = sorted({record["corpus"] for record in found})
     return [
-        f"Generated corpus {', '.join(corpora)}; the tiny preset, {', '.join(map(str, steps))} steps of 8 clips a run,"
+        f"Corpus {', '.join(corpora)}; the tiny preset, {', '.join(map(str, steps))} steps a run,"
         f" {len(trained)} records, {minutes:.0f} minutes of training on 2 cores beside other work;"
         f" {trained[0]['samples']} samples of {trained[0]['clips']} test clips.",
     ]

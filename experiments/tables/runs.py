@@ -1,19 +1,13 @@
-"""What the tables share: train a variant with a seed if that was not done yet, score it, keep the record.
-
-Records are lines of JSON in ``results/<table>.jsonl``, one for each variant and seed, so that an experiment that was
-stopped goes on where it was, and a table can be drawn from what there is.
-"""
+"""What the tables share: train a variant with a seed if that was not done yet, score it, keep the record."""
 
 import argparse
 import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.evaluate import evaluate
@@ -22,14 +16,8 @@ from a2g_jax.models import find_model
 from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import RunConfig, load_run, run_to_json
-
-RESULTS = Path(__file__).parent / "results"
-
-#: What the tables change in the tiny preset, for every row of Audio2Gestures. It was found by trying on seed 0: a wider
-#: specific code, a larger diversity loss, and in generation one draw of the statistics for the whole speech, as in the
-#: paper, with noise that changes slowly. The paper's own weights silence the shared code at this size (Table 2).
-BASE = {"kl_specific_weight": 5e-5, "diversity_weight": 0.1, "noise_frames": 32, "redraw_frames": 0}
+from a2g_jax.training.run import Run, RunConfig, load_run, run_to_json
+from experiments.tables.records import all_tables, append, records
 
 
 @dataclass(frozen=True)
@@ -39,10 +27,43 @@ class Variant:
     changes: Mapping[str, Any]
     model: str = "audio2gestures"
     preset: str = "tiny"
+    training: Mapping[str, Any] | None = None
+    """Changes of the tiny preset's settings of training."""
     generation: Mapping[str, Any] | None = None
     """Changes of settings that act in generation alone, made after training the variant of that name."""
     trained_as: str = ""
     """The variant whose weights it takes; empty for its own."""
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """What is measured with, the same for all rows of a table."""
+
+    corpus: Corpus
+    network: FeatureNetwork | None
+    samples: int
+
+
+#: ``score(name, run, ruler, seed) -> what a record says beside its conditions``: "scores", and more if there is more.
+Score = Callable[[str, Run, Ruler, int], dict[str, Any]]
+
+
+def whole_recordings(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
+    """Scores on whole test recordings, and whether the model listens: what ``a2g evaluate --audit`` says."""
+    result = evaluate(
+        {name: run},
+        ruler.corpus,
+        samples=ruler.samples,
+        seed=seed,
+        network=ruler.network,
+        audit=True,
+        baselines=False,
+    )
+    return {
+        "clips": result["about"]["clips"],
+        "scores": result["rows"][0]["scores"],
+        "audit": result["audits"][name],
+    }
 
 
 @dataclass(frozen=True)
@@ -66,7 +87,7 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only drawn")
     parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it")
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="folder for trained runs (default: runs)")
-    parser.add_argument("--steps", type=int, default=3000, help="training steps of each run (default: 3000)")
+    parser.add_argument("--steps", type=int, default=1000, help="training steps of each run (default: 1000)")
     parser.add_argument("--samples", type=int, default=20)
     parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: 0,1,2)")
     parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training begins")
@@ -82,24 +103,17 @@ def setting(options: argparse.Namespace) -> Setting:
     )
 
 
-def records(table: str) -> list[dict[str, Any]]:
-    """What was measured for a table so far."""
-    path = RESULTS / f"{table}.jsonl"
-    if not path.exists():
-        return []
-    found = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    # Two processes that worked at once may both have scored what has no training.
-    return list({_identity(record): record for record in found}.values())
-
-
-def _identity(record: Mapping[str, Any]) -> tuple[Any, ...]:
-    return tuple(record[name] for name in ("variant", "seed", "corpus", "feature_network", "steps", "samples"))
-
-
-def run_table(table: str, variants: Mapping[str, Variant], where: Setting, only: Sequence[str] | None = None) -> None:
+def run_table(
+    table: str,
+    variants: Mapping[str, Variant],
+    where: Setting,
+    only: Sequence[str] | None = None,
+    score: Score = whole_recordings,
+) -> None:
     """Train and score every variant with every seed that has no record yet, seed by seed."""
     began = time.monotonic()
-    corpus, network, measured = _measure(where)
+    ruler, measured = measure(where)
+    corpus = ruler.corpus
     conditions = {**measured, "steps": where.steps}
     for seed in where.seeds:
         for name, variant in variants.items():
@@ -112,38 +126,26 @@ def run_table(table: str, variants: Mapping[str, Variant], where: Setting, only:
                 print(f"{table}: the budget of {where.minutes:g} minutes is used up; run it again to go on")
                 return
             digest, described = _described(name, variant, variants, seed, corpus, where)
-            twin = _same(digest, conditions)
+            twin = _same(table, digest, conditions)
             if twin is not None:
                 append(table, {**twin, "variant": name})
                 continue
             run, seconds = _trained(described, variant, corpus, where)
-            result = evaluate(
-                {name: run}, corpus, samples=where.samples, seed=seed, network=network, audit=True, baselines=False
-            )
             record = {
                 **wanted,
                 "settings": digest,
                 "model": variant.model,
                 "changes": {**variant.changes, **(variant.generation or {})},
                 "train_seconds": seconds,
-                "clips": result["about"]["clips"],
-                "scores": result["rows"][0]["scores"],
-                "audit": result["audits"][name],
+                **score(name, run, ruler, seed),
             }
             append(table, record)
             print(f"{table}: {name}, seed {seed}: {_line(record)}", flush=True)
 
 
-def append(table: str, record: Mapping[str, Any]) -> None:
-    """Add a record to a table's file."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
-    with (RESULTS / f"{table}.jsonl").open("a", encoding="utf-8") as file:
-        file.write(json.dumps(record) + "\n")
-
-
 def baselines(table: str, where: Setting) -> None:
     """Score the truth and what is neither it nor a model, once for a corpus and a feature network."""
-    corpus, network, wanted = _measure(where)
+    ruler, wanted = measure(where)
 
     def found(name: str) -> list[dict[str, Any]]:
         return [
@@ -155,9 +157,9 @@ def baselines(table: str, where: Setting) -> None:
     if found(table):
         return
     # Those of another table of the same corpus are the same.
-    rows = next((found(path.stem) for path in sorted(RESULTS.glob("*.jsonl")) if found(path.stem)), None)
+    rows = next((found(name) for name in all_tables(table.split("/")[0]) if found(name)), None)
     if rows is None:
-        result = evaluate({}, corpus, samples=where.samples, seed=0, network=network)
+        result = evaluate({}, ruler.corpus, samples=where.samples, seed=0, network=ruler.network)
         rows = [
             {"variant": row["name"], "seed": 0, **wanted, "steps": 0, "scores": row["scores"]} for row in result["rows"]
         ]
@@ -165,8 +167,8 @@ def baselines(table: str, where: Setting) -> None:
         append(table, row)
 
 
-def _measure(where: Setting) -> tuple[Corpus, FeatureNetwork | None, dict[str, Any]]:
-    """The corpus, the feature network, and what of them a record notes."""
+def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
+    """What is measured with, and what of it a record notes."""
     corpus = Corpus.open(where.corpus)
     network = None if where.features is None else load_feature_network(where.features, corpus)
     measured = {
@@ -174,7 +176,7 @@ def _measure(where: Setting) -> tuple[Corpus, FeatureNetwork | None, dict[str, A
         "feature_network": None if network is None else network.fingerprint[:16],
         "samples": where.samples,
     }
-    return corpus, network, measured
+    return Ruler(corpus, network, where.samples), measured
 
 
 def _described(
@@ -194,11 +196,11 @@ def _described(
     training = replace(
         TRAIN_PRESETS["tiny"],
         steps=where.steps,
-        warmup_steps=min(300, where.steps // 10),
+        **{"warmup_steps": min(300, where.steps // 10), **(variant.training or {})},
         seed=seed,
-        validate_every=400,
+        validate_every=where.steps,
     )
-    needs = getattr(config, "lpips_weight", 0.0) > 0
+    needs = any(getattr(config, name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
     perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
     described = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
     return _digest(described, variant.generation), described
@@ -209,10 +211,10 @@ def _digest(described: RunConfig, generation: Mapping[str, Any] | None) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _same(digest: str, conditions: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The record of a variant of any table that is the same under another name."""
-    for path in sorted(RESULTS.glob("*.jsonl")):
-        for record in records(path.stem):
+def _same(table: str, digest: str, conditions: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The record of a variant of any table of the paper that is the same under another name."""
+    for name in all_tables(table.split("/")[0]):
+        for record in records(name):
             if record.get("settings") == digest and all(record[key] == value for key, value in conditions.items()):
                 return record
     return None
@@ -235,65 +237,3 @@ def _line(record: Mapping[str, Any]) -> str:
     shown = ("position_l1", "fgd", "multimodality", "beat_alignment")
     scores = record["scores"]
     return ", ".join(f"{name} {scores[name]['mean']:.3f}" for name in shown if name in scores)
-
-
-def over_seeds(table: str, variant: str, metric: str) -> tuple[float, float, int] | None:
-    """Mean over seeds of a score, half the width of its 95 % interval (Student's t), and the number of seeds."""
-    return _interval([r["scores"][metric]["mean"] for r in records(table) if _has(r, variant, metric)])
-
-
-def best_over_seeds(table: str, variant: str, metric: str) -> float | None:
-    """Mean over seeds of the best sample's score."""
-    values = [r["scores"][metric]["best"] for r in records(table) if _has(r, variant, metric)]
-    values = [value for value in values if value is not None]
-    return float(np.mean(values)) if values else None
-
-
-def _has(record: Mapping[str, Any], variant: str, metric: str) -> bool:
-    return record["variant"] == variant and metric in record["scores"]
-
-
-def _interval(values: Sequence[float]) -> tuple[float, float, int] | None:
-    from scipy.stats import t
-
-    if not values:
-        return None
-    count = len(values)
-    half = float("nan")
-    if count > 1:
-        half = float(t.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
-    return float(np.mean(values)), half, count
-
-
-def difference(table: str, first: str, second: str, metric: str) -> tuple[float, float, int] | None:
-    """Interval of ``first - second``, paired by seed."""
-    by_seed: dict[int, dict[str, float]] = {}
-    for record in records(table):
-        for name in (first, second):
-            if _has(record, name, metric):
-                by_seed.setdefault(record["seed"], {})[name] = record["scores"][metric]["mean"]
-    return _interval([pair[first] - pair[second] for pair in by_seed.values() if len(pair) == 2])
-
-
-@dataclass(frozen=True)
-class Claim:
-    """Something the paper says of a table, as an inequality between two rows."""
-
-    text: str
-    first: str
-    second: str
-    metric: str
-    sign: int
-    """1 where ``first`` is said to score more than ``second``, -1 for less."""
-
-
-def judge(table: str, claim: Claim) -> str:
-    """``holds``, ``does not hold`` or ``undecided``, with the interval of the difference over seeds."""
-    found = difference(table, claim.first, claim.second, claim.metric)
-    if found is None or found[2] < 3:
-        return "undecided: fewer than 3 seeds"
-    mean, half, count = found
-    verdict = "undecided"
-    if abs(mean) > half:
-        verdict = "holds" if mean * claim.sign > 0 else "does not hold"
-    return f"{verdict}: {mean:+.3g} +- {half:.2g} over {count} seeds"

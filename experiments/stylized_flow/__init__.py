@@ -1,0 +1,1 @@
+"""The tables and figures of the stylized flow (ECCV 2022)."""

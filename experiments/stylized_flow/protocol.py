@@ -1,0 +1,143 @@
+"""The flow paper's two protocols: clips continued from their first poses (Sec. 4.1), and their scores (Sec. 4.2).
+
+TED: 42 frames at 15 fps, 12 given and 30 made. Trinity: 120 frames at 20 fps, 5 given, 95 made, and 20 of lookahead.
+Only frames that are made are scored. Every row of a table is scored on the same clips and frames, whatever history it
+needs itself.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.evaluation.places import Body
+from a2g_jax.generation.continuation import continue_clips
+from a2g_jax.metrics import beats, diversity, physical
+from a2g_jax.metrics.distribution import frechet_distance
+from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.training.run import Run
+from experiments.tables.runs import Ruler
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Which frames of which clips are made and scored."""
+
+    frames: int
+    """Of a clip."""
+    first: int
+    """The first that is made."""
+    last: int
+    """One behind the last."""
+    most: int = 64
+    """Clips of the test split that are scored, evenly spread over it."""
+
+
+TED = Protocol(42, 12, 42)
+TRINITY = Protocol(120, 5, 100)
+PROTOCOLS = {"ted": TED, "trinity": TRINITY}
+
+
+def starts_of(corpus: Corpus, protocol: Protocol, split: str = "test") -> Int[np.ndarray, " N"]:
+    """First rows of the clips that are scored."""
+    rows = [
+        row
+        for segment in corpus.segments(split)
+        for row in range(segment.start, segment.stop - protocol.frames + 1, protocol.frames)
+    ]
+    chosen = np.unique(np.linspace(0, len(rows) - 1, min(protocol.most, len(rows))).round().astype(int))
+    return np.array(rows)[chosen]
+
+
+def continued(protocol: Protocol) -> Any:
+    """A score of runs for :func:`experiments.tables.runs.run_table`."""
+
+    def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
+        del name
+        starts = starts_of(ruler.corpus, protocol)
+        audio, pose = clips_of(ruler.corpus, protocol, starts)
+        made = continue_clips(run, audio, pose, protocol.first, protocol.last, ruler.samples, seed)
+        return {"clips": len(starts), "scores": scores_of(made, ruler, protocol, starts, seed)}
+
+    return score
+
+
+def clips_of(
+    corpus: Corpus, protocol: Protocol, starts: Int[np.ndarray, " N"]
+) -> tuple[Float[np.ndarray, "N T bands"], Float[np.ndarray, "N T R D"]]:
+    """Audio and poses of whole clips."""
+    cut = [slice(start, start + protocol.frames) for start in starts]
+    return np.stack([corpus.audio[rows] for rows in cut]), np.stack([corpus.pose[rows] for rows in cut])
+
+
+def scores_of(
+    made: Float[np.ndarray, "N samples frames R D"],
+    ruler: Ruler,
+    protocol: Protocol,
+    starts: Int[np.ndarray, " N"],
+    seed: int,
+) -> dict[str, dict[str, Any]]:
+    """Means over clips with 95 % intervals, and the best of a clip's samples, averaged over clips."""
+    corpus, body = ruler.corpus, Body(ruler.corpus.body, ruler.corpus.representation)
+    audio, pose = clips_of(corpus, protocol, starts)
+    inner = slice(protocol.first, protocol.last)
+    truth = [body.places(one[inner]) for one in pose]
+    onsets = [beats.mel_onsets(one[inner], corpus.fps) for one in audio]
+    places = [[body.places(sample) for sample in clip] for clip in made]
+    per_clip: dict[str, list[list[float]]] = {name: [] for name in ("position_l1", "pck", "beat_alignment", "jerk")}
+    for clip, target, heard in zip(places, truth, onsets, strict=True):
+        near = body.near(target)
+        distance = [np.abs(sample - target) for sample in clip]
+        per_clip["position_l1"].append([body.scale * float(d.sum(-1).mean()) for d in distance])
+        per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])
+        moves = [beats.motion_beats(sample, corpus.fps, smoothing=2.0 / corpus.fps) for sample in clip]
+        sigma = beats.FLOW_SIGMA_FRAMES / corpus.fps
+        per_clip["beat_alignment"].append([beats.beat_alignment(m, heard, sigma) for m in moves if len(heard)])
+        per_clip["jerk"].append([_jerk(body, sample, corpus.fps) for sample in clip])
+    rng = np.random.default_rng(seed)
+    summary = {name: _summary(name, values, rng) for name, values in per_clip.items()}
+    if made.shape[1] > 1:
+        spread = [body.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
+        summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
+    # Between the first samples of different clips, as the paper has it; not within a long motion.
+    apart = body.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
+    summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
+    if ruler.network is not None:
+        features = lambda poses: np.concatenate([ruler.network.clip_features(one) for one in poses])  # noqa: E731
+        reference = features([one[inner] for one in pose])
+        values = [frechet_distance(features(made[:, k]), reference).value for k in range(made.shape[1])]
+        summary["fgd"] = {"mean": float(np.mean(values)), "low": None, "high": None, "best": float(min(values))}
+    return summary
+
+
+def _jerk(body: Body, places: Float[np.ndarray, "T P D"], fps: float) -> float:
+    return float(np.percentile(np.asarray(physical.jerk(body.wrists(places), fps)), 90))
+
+
+def _summary(name: str, values: list[list[float]], rng: np.random.Generator) -> dict[str, Any]:
+    rows = [row for row in values if row]
+    interval = bootstrap_mean(np.array([np.mean(row) for row in rows]), rng)
+    best = {"position_l1": np.min, "pck": np.max}.get(name)
+    return {**interval._asdict(), "best": None if best is None else float(np.mean([best(row) for row in rows]))}
+
+
+def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str, Any]]:
+    """Scores of what is no model: the truth, another clip's motion, and the mean pose."""
+    starts = starts_of(ruler.corpus, protocol)
+    _, pose = clips_of(ruler.corpus, protocol, starts)
+    inner = pose[:, protocol.first : protocol.last]
+    mean = np.asarray(ruler.corpus.statistics["pose"].mean)
+    if ruler.corpus.representation == "directions":
+        mean = mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
+    candidates = {
+        "truth": inner,
+        "another clip's motion": np.roll(inner, len(inner) // 2, axis=0),
+        "first pose held": np.broadcast_to(pose[:, protocol.first - 1 : protocol.first], inner.shape),
+        "mean pose": np.broadcast_to(mean[None, None], inner.shape),
+    }
+    return {
+        name: scores_of(np.asarray(made, np.float32)[:, None], ruler, protocol, starts, seed)
+        for name, made in candidates.items()
+    }

@@ -1,0 +1,38 @@
+"""What the tables of the stylized flow have in common."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.stylized_flow.protocol import PROTOCOLS
+from experiments.tables.runs import Variant
+
+#: How flows are trained here: the published schedule and clipping, at a size and for a time that 2 cores allow.
+TRAINING: dict[str, Any] = {
+    "batch_size": 16,
+    "learning_rate": 1.5e-3,
+    "schedule": "noam",
+    "warmup_steps": 300,
+    "clip_value": 5.0,
+    "clip_norm": 100.0,
+    "augmentation": 0.0,
+}
+
+#: MoGlow, as a change of the flow's presets: LSTMs, a normal prior, no global encoder and no reverse pass.
+MOGLOW = {"cell": "lstm", "freedom": 0.0, "global_channels": 0, "reverse_share": 0.0}
+
+#: Clips and context of the protocols; with the flow's tiny networks otherwise.
+CLIPS: Mapping[str, Mapping[str, Any]] = {
+    "trinity": {"history_frames": 5, "lookahead_frames": 20, "clip_frames": PROTOCOLS["trinity"].frames},
+    "ted": {"history_frames": 12, "lookahead_frames": 0, "clip_frames": PROTOCOLS["ted"].frames},
+}
+PERCEPTUAL = {"perceptual_weight": 0.1}
+
+
+def flow(protocol: str, **changes: Any) -> Variant:
+    """A flow on a protocol's clips, with its perceptual loss unless that is changed."""
+    return Variant({**CLIPS[protocol], **PERCEPTUAL, **changes}, model="stylized_flow", training=TRAINING)
+
+
+def moglow(protocol: str, cell: str = "lstm") -> Variant:
+    """MoGlow on a protocol's clips; with GRUs it is the paper's baseline of Table 2."""
+    return Variant({**CLIPS[protocol], **MOGLOW, "cell": cell}, model="stylized_flow", training=TRAINING)

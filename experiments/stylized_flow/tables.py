@@ -1,0 +1,14 @@
+"""Rows beside the models."""
+
+from experiments.stylized_flow.protocol import Protocol, nulls
+from experiments.tables.records import append, records
+from experiments.tables.runs import Setting, measure
+
+
+def with_nulls(table: str, where: Setting, protocol: Protocol) -> None:
+    """Score the truth, another clip's motion and poses that stand still, once for a corpus and a feature network."""
+    ruler, measured = measure(where)
+    if any(record["steps"] == 0 and measured.items() <= record.items() for record in records(table)):
+        return
+    for name, scores in nulls(ruler, protocol).items():
+        append(table, {"variant": name, "seed": 0, **measured, "steps": 0, "scores": scores})

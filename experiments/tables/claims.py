@@ -1,0 +1,71 @@
+"""Scores over seeds, and what they say of a paper's claims."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.tables.records import records
+
+
+def over_seeds(table: str, variant: str, metric: str) -> tuple[float, float, int] | None:
+    """Mean over seeds of a score, half the width of its 95 % interval (Student's t), and the number of seeds."""
+    return _interval([r["scores"][metric]["mean"] for r in records(table) if _has(r, variant, metric)])
+
+
+def best_over_seeds(table: str, variant: str, metric: str) -> float | None:
+    """Mean over seeds of the best sample's score."""
+    values = [r["scores"][metric]["best"] for r in records(table) if _has(r, variant, metric)]
+    values = [value for value in values if value is not None]
+    return float(np.mean(values)) if values else None
+
+
+def _has(record: Mapping[str, Any], variant: str, metric: str) -> bool:
+    return record["variant"] == variant and metric in record["scores"]
+
+
+def _interval(values: Sequence[float]) -> tuple[float, float, int] | None:
+    from scipy.stats import t
+
+    if not values:
+        return None
+    count = len(values)
+    half = float("nan")
+    if count > 1:
+        half = float(t.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count))
+    return float(np.mean(values)), half, count
+
+
+def difference(table: str, first: str, second: str, metric: str) -> tuple[float, float, int] | None:
+    """Interval of ``first - second``, paired by seed."""
+    by_seed: dict[int, dict[str, float]] = {}
+    for record in records(table):
+        for name in (first, second):
+            if _has(record, name, metric):
+                by_seed.setdefault(record["seed"], {})[name] = record["scores"][metric]["mean"]
+    return _interval([pair[first] - pair[second] for pair in by_seed.values() if len(pair) == 2])
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something the paper says of a table, as an inequality between two rows."""
+
+    text: str
+    first: str
+    second: str
+    metric: str
+    sign: int
+    """1 where ``first`` is said to score more than ``second``, -1 for less."""
+
+
+def judge(table: str, claim: Claim) -> str:
+    """``holds``, ``does not hold`` or ``undecided``, with the interval of the difference over seeds."""
+    found = difference(table, claim.first, claim.second, claim.metric)
+    if found is None or found[2] < 3:
+        return "undecided: fewer than 3 seeds"
+    mean, half, count = found
+    verdict = "undecided"
+    if abs(mean) > half:
+        verdict = "holds" if mean * claim.sign > 0 else "does not hold"
+    return f"{verdict}: {mean:+.3g} +- {half:.2g} over {count} seeds"

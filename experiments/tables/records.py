@@ -1,0 +1,51 @@
+"""What was measured, as lines of JSON: one for each variant and seed.
+
+A table is named by its paper and its own name, ``audio2gestures/table2``; its records lie in
+``experiments/audio2gestures/results/table2.jsonl``, so that an experiment that was stopped goes on where it was, and a
+table can be drawn from what there is.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+EXPERIMENTS = Path(__file__).parents[1]
+
+#: What tells one record of a table from another.
+_IDENTITY = ("variant", "seed", "corpus", "feature_network", "steps", "samples")
+
+
+def results(paper: str) -> Path:
+    """The folder of a paper's results."""
+    return EXPERIMENTS / paper / "results"
+
+
+def path_of(table: str, ending: str = ".jsonl") -> Path:
+    """A file of a table."""
+    paper, name = table.split("/")
+    return results(paper) / f"{name}{ending}"
+
+
+def all_tables(paper: str) -> Iterator[str]:
+    """Names of the tables of a paper that have records."""
+    for path in sorted(results(paper).glob("*.jsonl")):
+        yield f"{paper}/{path.stem}"
+
+
+def records(table: str) -> list[dict[str, Any]]:
+    """What was measured for a table so far."""
+    path = path_of(table)
+    if not path.exists():
+        return []
+    found = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    # Two processes that worked at once may both have scored what has no training.
+    return list({tuple(record.get(name) for name in _IDENTITY): record for record in found}.values())
+
+
+def append(table: str, record: Mapping[str, Any]) -> None:
+    """Add a record to a table's file."""
+    path = path_of(table)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(record) + "\n")

@@ -1,0 +1,178 @@
+"""Style controls in the flow: told beside the audio, never hidden, and followed in generation."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from a2g_jax.cli import main
+from a2g_jax.errors import InputError
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.models import MODELS
+from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
+from a2g_jax.models.stylized_flow.controls import asked, measure, parse_curves, scaled
+from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.training.config import TrainConfig, training_preset
+from a2g_jax.training.state import advance, init_state
+
+CONFIG = StylizedFlowConfig(
+    flow_steps=2,
+    hidden=8,
+    layers=1,
+    cell="lstm",
+    freedom=0.0,
+    history_frames=2,
+    lookahead_frames=1,
+    frame_dropout=0.9,
+    global_channels=0,
+    reverse_share=0.0,
+    clip_frames=20,
+    style_controls=("height",),
+)
+BODY = Skeleton(
+    np.array([[0, 0, 0], [0.2, 0.4, 0], [-0.2, 0.4, 0], [0.5, 0, 0], [-0.5, 0, 0]], np.float32),
+    ("Pelvis", "L_Shoulder", "R_Shoulder", "L_Wrist", "R_Wrist"),
+    (-1, 0, 0, 1, 2),
+)
+DATA = Data(BODY, 20.0, 4, Statistics(np.zeros((5, 3), np.float32), np.full((5, 3), 0.5, np.float32)), "exponential")
+SETTINGS = TrainConfig(steps=60, learning_rate=1e-2, clip_value=5.0, clip_norm=100.0)
+
+
+def batch_of(clips=8, frames=20, seed=0):
+    """Arms that each clip holds at an angle of its own, and audio that says nothing of it."""
+    rng = np.random.default_rng(seed)
+    pose = 0.1 * rng.normal(size=(clips, frames, 5, 3))
+    level = rng.normal(scale=0.5, size=(clips, 1))
+    pose[:, :, 1, 2] += level
+    pose[:, :, 2, 2] -= level
+    audio = rng.normal(size=(clips, frames, 4))
+    return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32))
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """Weights after sixty steps, and the summary of some clips."""
+    model = build(CONFIG, DATA)
+    state = init_state(model, SETTINGS)
+    step = jax.jit(lambda state, batch, key: advance(model, SETTINGS, state, batch, key)[0])
+    for number in range(60):
+        state = step(state, batch_of(seed=number), jax.random.key(number))
+    return state.params, jax.jit(model.summarise)(state.params, jax.random.key(0), batch_of(clips=64, seed=99))
+
+
+heights_of = jax.jit(lambda pose: measure(("height",), DATA, pose))
+
+
+def generated(trained, *curves, frames=128):
+    """Heights of the hands at every frame of a motion."""
+    model = build(replace(CONFIG, control_curves=curves), DATA)
+    params, summary = trained
+    heard = jax.jit(model.condition)(params, batch_of(clips=1, frames=frames, seed=5).audio[0])
+    pose = jax.jit(model.sample)(params, summary, jax.random.key(1), heard, jnp.int32(0))
+    return np.asarray(heights_of(pose[None])[0, :, 0])
+
+
+def test_what_is_asked_for_is_what_the_hands_do(trained):
+    low, high = generated(trained, "height=10").mean(), generated(trained, "height=90").mean()
+    wanted = np.percentile(trained[1]["control_mean"], [10, 90])
+    assert high - low > 0.5 * (wanted[1] - wanted[0])
+    # Over time: low at first, high at last.
+    risen = generated(trained, "height=10@2 90@4")
+    assert risen[-1] - risen[0] > 0.5 * (high - low)
+
+
+def test_controls_are_told_of_the_frame_itself_and_never_hidden():
+    networks = Networks(replace(CONFIG, style_controls=("height", "speed")), DATA)
+    batch = batch_of(clips=2)
+    hidden = jnp.zeros((2, 17, 2), bool)
+    tell = jax.jit(networks.told)
+    told = tell({}, batch.audio, networks.flat(batch.pose), hidden)
+    controls = jax.jit(lambda pose: scaled(("height", "speed"), measure(("height", "speed"), DATA, pose)))(batch.pose)
+    assert told.known.shape == (2, 17, 4 * 4 + 2)
+    np.testing.assert_allclose(told.known[..., -2:], controls[:, 2:19], atol=1e-4)
+    assert not told.history.any()
+    # Those that are given are taken instead, each frame its own; 0.1 m counts as 1.
+    rising = jnp.broadcast_to(jnp.arange(20.0)[None, :, None], (2, 20, 2))
+    given = tell({}, batch.audio, networks.flat(batch.pose), hidden, rising)
+    np.testing.assert_allclose(given.known[..., -2:], 10.0 * rising[:, 2:19], rtol=1e-6)
+
+
+def test_the_share_of_controls_is_that_of_training(trained):
+    """Controls added to what was heard give the motion of latents that training would."""
+    networks, params = Networks(CONFIG, DATA), trained[0]
+    batch = batch_of(clips=1, frames=64, seed=3)
+    z = jax.random.normal(jax.random.key(2), (64, 15))
+    controls = jnp.linspace(-0.2, 0.6, 64)[:, None]
+
+    @jax.jit
+    def one_by_one(params):
+        heard = networks.steered(params, networks.heard(params, batch.audio[0]), controls)
+        return networks.proceed(params, z[:, None], heard, networks.start(params, 1))[0][:, 0]
+
+    @jax.jit
+    def at_once(params, before):
+        ends = ((0, 0), (CONFIG.history_frames, CONFIG.lookahead_frames), (0, 0))
+        clip = [jnp.pad(values, ends) for values in (batch.audio, before[None], controls[None])]
+        return networks.motion(params, z[None], networks.told(params, *clip[:2], None, clip[2]))[0]
+
+    made = one_by_one(params)
+    np.testing.assert_allclose(at_once(params, made), made, atol=1e-4)
+
+
+def test_what_is_asked_for_is_the_same_in_any_window():
+    curves = parse_curves(("speed=0@1 100@3", "height=25"), ("height", "speed"))
+    training = jnp.stack([jnp.linspace(0.0, 0.4, 5), jnp.linspace(1.0, 2.0, 5)], axis=-1)
+    whole = asked(curves, training, jnp.int32(0), 256, 32.0)
+    parts = [asked(curves, training, jnp.int32(start), 128, 32.0) for start in (0, 128)]
+    np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-6)
+    np.testing.assert_allclose(whole[:, 0], np.full(256, 0.1), atol=1e-6)
+    np.testing.assert_allclose(whole[[0, 32, 64, 96, 255], 1], [1.0, 1.0, 1.5, 2.0, 2.0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"style_controls": ("width",)}, "--style-controls.*'width'"),
+        ({"style_controls": ("height", "height")}, "each once"),
+        ({"control_curves": ("speed=50",)}, "style controls are: height"),
+        ({"control_curves": ("height=101",)}, "from 0 to 100"),
+        ({"control_curves": ("height=-1",)}, "from 0 to 100"),
+        ({"control_curves": ("height=nan",)}, "'nan' is no number"),
+        ({"control_curves": ("height",)}, "NAME=PERCENTILE"),
+        ({"control_curves": ("height=",)}, "NAME=PERCENTILE"),
+        ({"control_curves": ("height=10@0 90",)}, "NAME=PERCENTILE"),
+        ({"control_curves": ("height=10@2 90@1",)}, "seconds that rise"),
+        ({"control_curves": ("height=10", "height=20")}, "twice"),
+    ],
+)
+def test_wrong_controls_are_named(changes, named):
+    with pytest.raises(InputError, match=named):
+        replace(CONFIG, **changes)
+
+
+def test_every_preset_of_every_model_can_be_trained_and_moglow_as_published(capsys):
+    for name, entry in MODELS.items():
+        for preset in entry.presets:
+            assert training_preset(name, preset).steps > 0
+    for preset in ("moglow", "moglow_styled"):
+        training = training_preset("stylized_flow", preset)
+        assert (training.batch_size, training.steps, training.learning_rate) == (80, 80_000, 1.5e-3)
+        assert (training.schedule, training.warmup_steps) == ("noam", 3_000)
+        assert (training.clip_value, training.clip_norm) == (5.0, 100.0)
+    assert training_preset("stylized_flow", "ted").batch_size == 200
+    assert training_preset("stylized_flow", "paper").steps == 30_000
+    assert PRESETS["moglow_styled"] == replace(PRESETS["moglow"], style_controls=("height", "speed", "radius"))
+    assert main(["train", "stylized_flow", "--preset", "moglow", "--settings"]) == 0
+    shown = capsys.readouterr().out
+    assert "--hidden 512" in shown
+    assert "--batch-size 80" in shown
+
+
+def test_a_run_without_controls_takes_none(capsys, tmp_path):
+    arguments = ["generate", "demo", "--audio", str(tmp_path / "x.wav"), "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--control", "height=90"]) == 2
+    assert "demo was trained without style controls" in capsys.readouterr().err
