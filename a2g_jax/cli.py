@@ -191,7 +191,7 @@ def make_parser() -> argparse.ArgumentParser:
     retargeting.add_arguments(retarget)
 
     generate = command("generate", "Make motions for a speech with a trained run.")
-    generate.add_argument("run", help="a run folder, or 'demo' for the weights that come along")
+    generate.add_argument("run", help="a run folder, or 'demo' or 'demo-flow' for weights that come along")
     generate.add_argument("--audio", required=True, metavar="FILE", help="speech, in any common format")
     generate.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
     generate.add_argument(

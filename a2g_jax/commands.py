@@ -36,7 +36,7 @@ from a2g_jax.progress import progress_bar
 from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig, training_preset
 from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import Run, RunConfig, demo_run, load_run
+from a2g_jax.training.run import Run, RunConfig, demo_run, open_run
 
 #: The demo's own speech: who says it, for how long, and from which seed (one that no training corpus uses).
 DEMO_SPEECH: dict[str, Any] = {"seconds": 20.0, "seed": 20211011, "speaker": "chiara", "emotion": "neutral"}
@@ -289,7 +289,7 @@ def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     check_formats(options.formats)
     styling = styling_of(options)
     _cache_compilations()
-    run = _controlled(_edited(demo_run() if options.run == "demo" else load_run(options.run), options), options)
+    run = _controlled(_edited(open_run(options.run), options), options)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
     pins = _pins(options)
     _generate(run, audio, options, Path(options.audio).name, pins=pins, styling=styling)

@@ -10,7 +10,7 @@ from a2g_jax.evaluation.feature_network import load_feature_network
 from a2g_jax.evaluation.labelled import load_emotion_judge
 from a2g_jax.evaluation.report import markdown, merge, read_report, write_report
 from a2g_jax.progress import progress_bar
-from a2g_jax.training.run import Run, demo_run, load_run
+from a2g_jax.training.run import Run, open_run
 
 
 def run(options: argparse.Namespace, _extra: list[str]) -> None:
@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     for name in options.runs:
         if name in runs:
             raise InputError(f"{name}: is named twice.")
-        runs[name] = demo_run() if name == "demo" else load_run(name)
+        runs[name] = open_run(name)
     corpus = Corpus.open(options.corpus)
     network = load_feature_network(options.features, corpus) if options.features else None
     judge = load_emotion_judge(options.emotion_classifier, corpus) if options.emotion_classifier else None

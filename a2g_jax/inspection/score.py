@@ -23,7 +23,7 @@ from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.unlikely import Moment, robust_scale, unlikely_moments
 from a2g_jax.io.audio import read_audio
-from a2g_jax.training.run import Run, load_run
+from a2g_jax.training.run import Run, open_run
 
 #: Frames that are scored at once: bounds memory, and nothing compiles anew for a new length.
 WINDOW = 512
@@ -122,7 +122,7 @@ def score_file(folder: Path, path: Path, audio: Path) -> Score:
     Raises:
         InputError: a file that cannot be used, or as :func:`score_motion`, with the file named.
     """
-    run = load_run(folder)
+    run = open_run(folder)
     if run.config.build().score is None:
         raise InputError(
             f"{folder}: is a run of {run.config.model}, which tells no likelihood of a motion; name one of"

@@ -93,6 +93,7 @@ MODEL_PRESETS: dict[str, dict[str, TrainConfig]] = {
         "ted": replace(_FLOW, batch_size=200, learning_rate=1e-3),
         "moglow": replace(_FLOW, batch_size=80),
         "moglow_styled": replace(_FLOW, batch_size=80),
+        "tiny": replace(_FLOW, steps=4_000, batch_size=16, warmup_steps=200, checkpoint_every=500, validate_every=500),
     }
 }
 """Of models whose papers train otherwise than :data:`TRAIN_PRESETS` has it: the stylized flow's (Sec. 4), and MoGlow's

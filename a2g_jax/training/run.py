@@ -225,6 +225,18 @@ def demo_run() -> Run:
         return load_run(folder)
 
 
+def demo_flow_run() -> Run:
+    """The trained flow that comes with the package: ``demo-flow`` on the command line."""
+    with resources.as_file(resources.files("a2g_jax") / "demo_flow") as folder:
+        return load_run(folder)
+
+
+def open_run(name: str | os.PathLike[str]) -> Run:
+    """A run folder, or one of those that come with the package: ``demo`` and ``demo-flow``."""
+    shipped = {"demo": demo_run, "demo-flow": demo_flow_run}.get(str(name))
+    return load_run(name) if shipped is None else shipped()
+
+
 def demo_feature_run() -> tuple[Run, str]:
     """The feature network that comes with the package, and the SHA-256 of its weights."""
     with resources.as_file(resources.files("a2g_jax") / "demo_features") as folder:

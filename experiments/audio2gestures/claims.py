@@ -1,6 +1,7 @@
 """What the method is said to do, checked on runs of Table 2 with several seeds and put on one page.
 
-    python -m experiments.audio2gestures.table2 --corpus CORPUS --features RUN --only "baseline,+ diversity loss"
+    python -m experiments.audio2gestures.table2 --corpus CORPUS --features RUN
+    python -m experiments.audio2gestures.long --corpus CORPUS --features RUN --steps 3000
     python -m experiments.audio2gestures.codes --corpus CORPUS RUN [RUN ...]
     python -m experiments.audio2gestures.claims
 
@@ -77,6 +78,10 @@ def page() -> str:
         for record in of(name, steps):
             if record.get("audit"):
                 lines.append(f"| {name} | {record['seed']} | {listening(record)} |")
+    for record in records("audio2gestures/long"):
+        if record.get("audit"):
+            title = f"{record['variant']}, {record['steps']} steps"
+            lines.append(f"| {title} | {record['seed']} | {listening(record)} |")
     path = results("audio2gestures") / "codes.json"
     if path.exists():
         lines += ["", "## Codes exchanged between two motions", ""]

@@ -11,7 +11,7 @@ TRAINING: dict[str, Any] = {
     "batch_size": 16,
     "learning_rate": 1.5e-3,
     "schedule": "noam",
-    "warmup_steps": 300,
+    "warmup_steps": 200,
     "clip_value": 5.0,
     "clip_norm": 100.0,
     "augmentation": 0.0,

@@ -31,8 +31,14 @@ COLUMNS = (
     "diversity",
     "multimodality",
 )
-#: Those of single papers, behind them.
-_OTHERS = ("beat_alignment", "chi", "silhouette", "chi_full", "silhouette_full", "chi_shuffled", "silhouette_shuffled")
+#: Behind them, by paper.
+_OTHERS = {
+    "audio2gestures": ("beat_alignment",),
+    "stylized_flow": (
+        *("beat_alignment", "jerk", "chi", "silhouette", "chi_full", "silhouette_full"),
+        *("chi_shuffled", "silhouette_shuffled"),
+    ),
+}
 _T_SNE = "stylized flow, Table 3"
 METRICS = {
     **SCORED,
@@ -85,7 +91,9 @@ def render(
 ) -> str:
     """Markdown with our table, what the paper reports and whether its claims hold here."""
     found = records(table)
-    columns = [name for name in (*COLUMNS, *_OTHERS) if any(name in record["scores"] for record in found)]
+    columns = [
+        name for name in (*COLUMNS, *_OTHERS[table.split("/")[0]]) if any(name in record["scores"] for record in found)
+    ]
     names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
     head = " | ".join(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in columns)
     lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]

@@ -30,6 +30,7 @@ SMALL = StylizedFlowConfig(
     embedding_channels=4,
     reverse_share=1.0,
 )
+LINEAR = replace(SMALL, predictor=True, global_channels=0, reverse_share=0.0)
 MOGLOW = replace(SMALL, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0)
 SHAPE = (2, 3)
 DATA = Data(
@@ -61,7 +62,7 @@ def trained(config, steps=60):
     return model, state, history
 
 
-@pytest.mark.parametrize("config", [SMALL, MOGLOW], ids=["stylized flow", "moglow"])
+@pytest.mark.parametrize("config", [SMALL, MOGLOW, LINEAR], ids=["stylized flow", "moglow", "linear"])
 def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
     model, state, history = trained(config)
     assert bool(state.good)
@@ -139,6 +140,7 @@ def test_noam_rises_falls_and_ends_at_a_tenth():
     [
         ({"cell": "rnn"}, "--cell"),
         ({"history_frames": 0}, "--history-frames"),
+        ({"history_frames": 1, "predictor": True}, "--history-frames"),
         ({"frame_dropout": 1.5}, "--frame-dropout"),
         ({"clip_frames": 5}, "--clip-frames"),
         ({"perceptual_weight": float("inf")}, "--perceptual-weight"),

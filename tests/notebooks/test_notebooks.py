@@ -12,7 +12,7 @@ NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 
 
 def test_there_are_notebooks():
-    assert {"latent_dct_edits", "audio2gestures_tour"} <= {path.stem for path in NOTEBOOKS}
+    assert {"latent_dct_edits", "audio2gestures_tour", "stylized_flow_tour"} <= {path.stem for path in NOTEBOOKS}
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])

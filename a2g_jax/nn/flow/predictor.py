@@ -5,8 +5,9 @@ very long to learn that as exactly as a density needs. So the first layer subtra
 channel and whitens what is left; both are fitted to the first batch, as actnorms are (Glow, Sec. 3.1), and trained on.
 The published flows have no such layer.
 
-``y = L (x - x_1 - sum_k a_k (x_k - x_{k+1}))``, with x_k the pose k frames before, coefficients a_k for every channel,
-and L lower triangular, so that the log-determinant is a sum.
+``y = L (x - x_1 - sum_k a_k (x_k - x_{k+1}) - b x_1)``, with x_k the pose k frames before, coefficients a_k and a pull
+towards the mean pose b for every channel, and L lower triangular, so that the log-determinant is a sum. Without the
+pull, long motions drift away from the mean pose, since each frame only adds to the one before.
 """
 
 import jax
@@ -19,6 +20,8 @@ Params = dict[str, Array]
 
 #: Added to the variances that are divided by, as a share of their mean and at least this much.
 _RIDGE, _EPSILON = 1e-3, 1e-8
+#: The pull is fitted to one batch and must not be none, or even a push: its time constant, in frames.
+_SLOWEST, _FASTEST = 500.0, 5.0
 #: Not trained.
 FIXED_SPREAD = "spread"
 
@@ -27,6 +30,7 @@ def init_predictor(history: int, channels: int) -> Params:
     """The pose before, held, and errors as they are; :func:`fit_predictor` makes what training starts from."""
     return {
         "coefficients": jnp.zeros((history - 1, channels)),
+        "pull": jnp.zeros((channels,)),
         "lower": jnp.zeros((channels, channels)),
         "log_scale": jnp.zeros((channels,)),
         FIXED_SPREAD: jnp.ones((channels,)),
@@ -34,10 +38,12 @@ def init_predictor(history: int, channels: int) -> Params:
 
 
 def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]) -> Params:
-    """Least squares of every channel on its own differences, and the Cholesky factor of the errors' covariance."""
+    """Least squares of every channel on its own differences and its place, and the Cholesky factor of the errors'
+    covariance."""
     channels = x.shape[-1]
     steps = _differences(poses).reshape(-1, poses.shape[2] - 1, channels)
-    target = (x - poses[:, :, -1]).reshape(-1, channels)
+    place = poses[:, :, -1].reshape(-1, channels)
+    target = x.reshape(-1, channels) - place
     count = len(target)
 
     def one_channel(step: Float[Array, "n lags"], wanted: Float[Array, " n"]) -> Float[Array, " lags"]:
@@ -47,6 +53,9 @@ def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]
 
     coefficients = jax.vmap(one_channel, in_axes=(2, 1), out_axes=1)(steps, target)
     errors = target - jnp.sum(steps * coefficients[None], axis=1)
+    slope = jnp.mean(errors * place, axis=0) / (jnp.mean(jnp.square(place), axis=0) + _EPSILON)
+    pull = jnp.clip(slope, -1.0 / _FASTEST, -1.0 / _SLOWEST)
+    errors = errors - place * pull[None]
     covariance = errors.T @ errors / count
     size = _RIDGE * jnp.mean(jnp.diag(covariance)) + _EPSILON
     factor = jnp.linalg.cholesky(covariance + size * jnp.eye(channels))
@@ -54,6 +63,7 @@ def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]
     diagonal = jnp.diag(whitening)
     return {
         "coefficients": coefficients,
+        "pull": pull,
         # In units of each row's own scale, so that steps of training mean the same everywhere.
         "lower": jnp.tril(whitening / diagonal[:, None], -1),
         "log_scale": jnp.log(diagonal),
@@ -66,7 +76,8 @@ def expected(params: Params, poses: Float[Array, "*S history C"]) -> Float[Array
     coefficients = params["coefficients"]
     steps = _differences(poses)
     weights = coefficients.reshape((1,) * (steps.ndim - 2) + coefficients.shape)
-    return poses[..., -1, :] + jnp.sum(steps * weights, axis=-2)
+    last = poses[..., -1, :]
+    return last * (1.0 + of_channels(params["pull"], last)) + jnp.sum(steps * weights, axis=-2)
 
 
 def predictor(params: Params, x: Float[Array, "*S C"], poses: Float[Array, "*S history C"]) -> Float[Array, "*S C"]:

@@ -70,7 +70,19 @@ def test_motion_of_constant_speed_is_continued_exactly():
     frames = jnp.arange(40.0)[None, :, None] * jnp.array([0.3, -0.1, 0.02])[None, None]
     poses = jnp.stack([frames[:, lag : lag + 36] for lag in range(HISTORY)], axis=2)
     params = fit_predictor(frames[:, HISTORY:], poses)
-    np.testing.assert_allclose(expected(params, poses), frames[:, HISTORY:], atol=2e-3)
+    unpulled = {**params, "pull": jnp.zeros(CHANNELS)}
+    np.testing.assert_allclose(expected(unpulled, poses), frames[:, HISTORY:], atol=2e-3)
+    assert np.all(np.asarray(params["pull"]) <= -1 / 500)
+
+
+def test_the_pull_is_that_of_a_process_that_returns():
+    rng, frames = np.random.default_rng(3), 4000
+    walk = np.zeros((1, frames, 1))
+    for frame in range(1, frames):
+        walk[:, frame] = 0.95 * walk[:, frame - 1] + rng.normal(size=(1, 1))
+    poses = np.stack([walk[:, lag : frames - HISTORY + lag] for lag in range(HISTORY)], axis=2)
+    params = fit_predictor(jnp.asarray(walk[:, HISTORY:], jnp.float32), jnp.asarray(poses, jnp.float32))
+    np.testing.assert_allclose(params["pull"], -0.05, atol=0.02)
 
 
 def test_a_channel_that_never_moves_is_no_trouble():

@@ -1,0 +1,14 @@
+"""The full model of Table 2, trained three times as long: what its rhythm comes to.
+
+    python -m experiments.audio2gestures.long --corpus CORPUS --features RUN --steps 3000
+
+Table 2 stops where the shared code has just begun to be heard.
+"""
+
+from experiments.audio2gestures.table2 import VARIANTS
+from experiments.tables.markdown import make
+
+FULL = "+ diversity loss"
+
+if __name__ == "__main__":
+    make("audio2gestures/long", "The full model of Table 2, trained longer", {FULL: VARIANTS[FULL]}, (), {})
