@@ -85,18 +85,27 @@ def page() -> str:
     path = results("audio2gestures") / "codes.json"
     if path.exists():
         lines += ["", "## Codes exchanged between two motions", ""]
-        lines += ["| run | pairs | the hand is I's | strokes are S's | strokes are I's | a stranger's |"]
-        lines += ["|" + " --- |" * 6]
-        for name, found in json.loads(path.read_text(encoding="utf-8"))["runs"].items():
-            keys = (
-                "hand_follows_specific",
-                "strokes_follow_shared",
-                "strokes_follow_specific",
-                "strokes_of_a_stranger",
-            )
-            cells = [f"{found[key]['mean']:.2f} [{found[key]['low']:.2f}, {found[key]['high']:.2f}]" for key in keys]
-            lines.append(f"| {name} | {found['pairs']} | {' | '.join(cells)} |")
+        found = json.loads(path.read_text(encoding="utf-8"))["runs"]
+        lines += ["S_M of one, I_M of the other:", "", *_exchanged(found, "", "S's", "I's")]
+        lines += [
+            "",
+            "As in generation, S_A of one's speech, and an I_R drawn with the mean and deviation of the other's I_M:",
+        ]
+        lines += ["", *_exchanged(found, "drawn_", "the speech's", "I's")]
     return "\n".join(lines) + "\n"
+
+
+def _exchanged(runs: dict[str, Any], kind: str, first: str, second: str) -> list[str]:
+    """What became of the hand and of the strokes, as rows."""
+    shared = "shared" if not kind else "audio"
+    keys = ("hand_follows_specific", f"strokes_follow_{shared}", "strokes_follow_specific", "strokes_of_a_stranger")
+    head = f"| run | pairs | the hand is {second} | strokes are {first} | strokes are {second} | a stranger's |"
+    lines = [head, "|" + " --- |" * 6]
+    for name, found in runs.items():
+        values = [found[kind + key] for key in keys]
+        cells = [f"{one['mean']:.2f} [{one['low']:.2f}, {one['high']:.2f}]" for one in values]
+        lines.append(f"| {name} | {found['pairs']} | {' | '.join(cells)} |")
+    return lines
 
 
 if __name__ == "__main__":

@@ -5,7 +5,11 @@
 Clips of the test split in which one wrist clearly moves more are paired so that the two wrists differ. Of two clips A
 and B, ``g(S_A, I_B)`` is decoded: the wrist that moves more should be B's (the hidden choice is in I), and the moments
 at which a wrist is fast should be A's (the rhythm is in S). Chance is one half for the hand; for the times the same is
-measured against the strokes of a third clip. Writes ``results/codes.json``.
+measured against the strokes of a third clip.
+
+An I_M tells nearly everything (the paper's Sec. 6.4), times included, so the same is measured as generation has it: S_A
+of A's speech with an I_R that the mapping net makes of noise with the mean and deviation of I_B. Writes
+``results/codes.json``.
 """
 
 import argparse
@@ -21,6 +25,7 @@ from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement, speed_peaks
 from a2g_jax.models.audio2gestures.codec import Networks
+from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.training.run import Run, demo_run, load_run
 from experiments.tables.records import results
 
@@ -31,14 +36,15 @@ CLEAR = 0.25
 SIGMA = 0.1
 
 
-def clips_of(corpus: Corpus) -> np.ndarray:
-    """Clips of the test split one after another (N, 128, J, 6)."""
+def clips_of(corpus: Corpus) -> tuple[np.ndarray, np.ndarray]:
+    """Clips of the test split one after another: poses (N, 128, J, 6) and audio (N, 128, bands)."""
     rows = [
         start
         for segment in corpus.segments("test")
         for start in range(segment.start, segment.stop - FRAMES + 1, FRAMES)
     ]
-    return np.stack([corpus.pose[row : row + FRAMES] for row in rows])
+    pose, audio = (np.stack([array[row : row + FRAMES] for row in rows]) for array in (corpus.pose, corpus.audio))
+    return pose, np.asarray(corpus.statistics["audio"].normalise(audio), np.float32)
 
 
 def dominance(speeds: np.ndarray) -> float:
@@ -59,7 +65,7 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     """Shares and agreements with their 95 % intervals over pairs."""
     body, fps = Body(corpus.body, corpus.representation), corpus.fps
     networks = Networks(run.config.model_config, run.config.data())
-    clips = clips_of(corpus)
+    clips, heard = clips_of(corpus)
     speeds = [wrist_speeds(body, clip, fps) for clip in clips]
     sides = np.array([dominance(one) for one in speeds])
     clear = np.nonzero(np.abs(sides) > CLEAR)[0]
@@ -75,24 +81,44 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
         specific = networks.encode_motion(run.params, pose_i)[1]
         return networks.decode(run.params, networks.to_time(shared), networks.to_time(specific.mean))
 
-    made = np.asarray(decode(clips[[a for a, _ in pairs]], clips[[b for _, b in pairs]]))
+    @jax.jit
+    def generate(audio, pose_i):
+        shared = networks.encode_audio(run.params, audio).mean
+        specific = networks.encode_motion(run.params, pose_i)[1]
+        mapped = networks.map_noise(run.params, code_noise(jax.random.key(seed), networks.to_time(specific.mean)))
+        return networks.decode(run.params, networks.to_time(shared), networks.to_time(mapped.mean))
+
+    firsts, seconds = [a for a, _ in pairs], [b for _, b in pairs]
+    made = np.asarray(decode(clips[firsts], clips[seconds]))
+    drawn = np.asarray(generate(heard[firsts], clips[seconds]))
     peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
     hand: list[float] = []
     own: list[float] = []
     donor: list[float] = []
     stranger: list[float] = []
-    for (a, b), pose in zip(pairs, made, strict=True):
-        ours = wrist_speeds(body, pose, fps)
-        hand.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
-        found = speed_peaks(ours.max(axis=1), fps)
-        third = int(rng.integers(len(clips)))
-        for values, other in ((own, a), (donor, b), (stranger, third)):
-            values.append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
+    drawn_hand: list[float] = []
+    drawn_own: list[float] = []
+    drawn_donor: list[float] = []
+    drawn_stranger: list[float] = []
+    swapped = (made, hand, own, donor, stranger)
+    generated = (drawn, drawn_hand, drawn_own, drawn_donor, drawn_stranger)
+    for poses, hands, *agreements in (swapped, generated):
+        for (a, b), pose in zip(pairs, poses, strict=True):
+            ours = wrist_speeds(body, pose, fps)
+            hands.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
+            found = speed_peaks(ours.max(axis=1), fps)
+            third = int(rng.integers(len(clips)))
+            for values, other in zip(agreements, (a, b, third), strict=True):
+                values.append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
     figures = {
         "hand_follows_specific": hand,
         "strokes_follow_shared": own,
         "strokes_follow_specific": donor,
         "strokes_of_a_stranger": stranger,
+        "drawn_hand_follows_specific": drawn_hand,
+        "drawn_strokes_follow_audio": drawn_own,
+        "drawn_strokes_follow_specific": drawn_donor,
+        "drawn_strokes_of_a_stranger": drawn_stranger,
     }
     return {"pairs": len(pairs), **{name: bootstrap_mean(np.array(v), rng)._asdict() for name, v in figures.items()}}
 

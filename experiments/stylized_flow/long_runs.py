@@ -18,7 +18,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.places import Body
 from a2g_jax.generation.generate import Generator
 from a2g_jax.io.files import write_json
-from a2g_jax.training.run import Run, load_run
+from a2g_jax.training.run import Run, open_run
 from experiments.tables.records import results
 
 STRETCH = 10.0
@@ -76,7 +76,7 @@ def measure(run: Run, corpus: Corpus, frames: int, samples: int, seed: int) -> d
 def main() -> None:
     """Measure runs and write the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("runs", nargs="+", help="folders of runs")
+    parser.add_argument("runs", nargs="+", help="folders of runs, or 'demo-flow'")
     parser.add_argument("--corpus", type=Path, required=True)
     parser.add_argument("--frames", type=int, default=5000)
     parser.add_argument("--samples", type=int, default=8)
@@ -84,7 +84,7 @@ def main() -> None:
     options = parser.parse_args()
     corpus, figures = Corpus.open(options.corpus), {}
     for name in options.runs:
-        run = load_run(name)
+        run = open_run(name)
         figures[Path(name).name] = {
             "steps": run.steps,
             **measure(run, corpus, options.frames, options.samples, options.seed),

@@ -34,8 +34,11 @@ from a2g_jax.training.run import open_run
 from experiments.tables.records import results
 
 SECONDS = 20.0
-#: Mode and share of style.
-SETTINGS = (("repeat", 0.7), ("repeat", 0.9), ("statistics", 0.9), ("statistics", 1.0))
+#: Mode, share of style, and whether motion goes on from the clip's last poses instead of the mean pose.
+SETTINGS = (
+    *(("repeat", 0.7, False), ("repeat", 0.9, False), ("repeat", 1.0, False), ("repeat", 0.9, True)),
+    *(("repeat", 1.0, True), ("statistics", 0.9, False)),
+)
 
 
 def clip_features(pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, " F"]:
@@ -105,9 +108,13 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
         plain = space.generate(speech.audio, samples, seed=number)
         source, target = mean_style(plain), hand_style(clip.motion.positions(), fps)
         conditions = {"plain": plain, "the clip itself": [clip.motion]}
-        for mode, share in SETTINGS:
+        for mode, share, seeded in SETTINGS:
             style = Style(latents, mode=mode, share=share)
-            conditions[f"{mode}, share {share:g}"] = space.generate(speech.audio, samples, seed=number, style=style)
+            # Nothing is left to chance of a clip repeated whole.
+            count = 1 if (mode, share) == ("repeat", 1.0) else samples
+            before = clip.motion if seeded else None
+            name = f"{mode}, share {share:g}" + (", after the clip" if seeded else "")
+            conditions[name] = space.generate(speech.audio, count, number, style, before)
         for name, motions in conditions.items():
             heard = clip.audio if name == "the clip itself" else speech.audio
             found = [agreement_with_null(one, heard, 16000) for one in motions]
