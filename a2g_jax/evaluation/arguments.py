@@ -10,9 +10,7 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g evaluate``."""
-    parser.add_argument(
-        "runs", nargs="*", metavar="RUN", help="run folders, demo or demo-flow; none: baselines alone"
-    )
+    parser.add_argument("runs", nargs="*", metavar="RUN", help="run folders, demo or demo-flow; none: baselines alone")
     parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and .png")
     parser.add_argument(

@@ -69,7 +69,7 @@ class FlowSpace:
                 cut = networks.steered(params, cut, asked(curves, summary["control_mean"], start, window, data.fps))
             draw = lambda key: draw_latents(config, key, start, window, networks.channels)  # noqa: E731
             z = base[:, None] + gain[None, None] * jax.vmap(draw, out_axes=1)(keys)
-            flat, carried = networks.proceed(params, z, cut, carried)
+            flat, carried = networks.proceed(params, z, cut, carried, networks.limits(summary))
             return valid_rows(networks.pose(jnp.swapaxes(flat, 0, 1)), data.representation), carried
 
         self._encode, self._begin, self._go_on = jax.jit(encode), jax.jit(begin), jax.jit(go_on)

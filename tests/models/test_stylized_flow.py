@@ -98,6 +98,34 @@ def test_a_motion_in_two_parts_is_the_motion_in_one():
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)
 
 
+def test_poses_beyond_those_of_training_are_drawn_back_and_no_others_are():
+    model = build(MOGLOW, DATA)
+    params = jax.jit(model.warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
+    key, audio = jax.random.key(3), batch_of(clips=1, frames=128).audio[0]
+    heard, sample = jax.jit(model.condition)(params, audio), jax.jit(model.sample)
+    free = sample(params, {}, key, heard, jnp.int32(0))
+
+    def within(low, high):
+        bounds = {"pose_low": jnp.full((2, 6), low), "pose_high": jnp.full((2, 6), high)}
+        return Networks(MOGLOW, DATA).flat(sample(params, bounds, key, heard, jnp.int32(0))[None])[0]
+
+    flat = Networks(MOGLOW, DATA).flat(free[None])[0]
+    np.testing.assert_array_equal(within(-1e3, 1e3), flat)
+    # The latents of an untrained flow are nearly its poses: what lies beyond 0.5 lies half as far beyond it.
+    kept, beyond = within(-0.5, 0.5), np.abs(np.asarray(flat)) > 0.5
+    np.testing.assert_allclose(np.abs(kept)[beyond], 0.5 + 0.5 * (np.abs(flat)[beyond] - 0.5), rtol=1e-4)
+    np.testing.assert_allclose(kept[~beyond], flat[~beyond], atol=1e-6)
+
+
+def test_the_summary_has_the_range_of_every_clip():
+    model, batch = build(MOGLOW, DATA), batch_of()
+    params = jax.jit(model.init)(jax.random.key(0))
+    summary = jax.jit(model.summarise)(params, jax.random.key(0), batch)
+    flat = Networks(MOGLOW, DATA).flat(batch.pose)
+    np.testing.assert_allclose(summary["pose_low"], flat.min(axis=1), rtol=1e-6)
+    np.testing.assert_allclose(summary["pose_high"], flat.max(axis=1), rtol=1e-6)
+
+
 def test_the_first_step_fits_the_actnorms_and_no_other_does():
     model = build(SMALL, DATA)
     frozen = TrainConfig(steps=5, learning_rate=1e-12)

@@ -80,11 +80,15 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
         return networks.fitted(params, batch.audio, flat, networks.controls(batch.pose))
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """Mean over time of the latents of every clip, and of its style controls where there are any."""
+        """Mean over time of the latents of every clip, the range of its poses, and its mean style controls if any."""
         del key
         flat = networks.flat(batch.pose)
         z, _ = networks.latents(params, networks.inner(flat), networks.told(params, batch.audio, flat))
-        means = {"latent_mean": jnp.mean(z, axis=1)}
+        means = {
+            "latent_mean": jnp.mean(z, axis=1),
+            "pose_low": jnp.min(flat, axis=1),
+            "pose_high": jnp.max(flat, axis=1),
+        }
         if config.style_controls:
             means["control_mean"] = jnp.mean(networks.controls(batch.pose), axis=1)
         return means
@@ -107,7 +111,7 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
             controls = asked(curves, jnp.asarray(summary["control_mean"]), start, frames, data.fps)
             heard = networks.steered(params, heard, controls)
         z = draw_latents(config, key, start, heard.embedding.shape[0], networks.channels)
-        flat, carried = networks.proceed(params, z[:, None], heard, carried)
+        flat, carried = networks.proceed(params, z[:, None], heard, carried, networks.limits(summary))
         return networks.pose(jnp.swapaxes(flat, 0, 1))[0], carried
 
     def sample(

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Key
 
-from a2g_jax.models.base import Data, Params
+from a2g_jax.models.base import Data, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, scaled
@@ -62,6 +62,20 @@ class Carried(NamedTuple):
     """Normalised poses, the oldest first."""
     states: Any
     """Of the recurrent layers."""
+
+
+class Limits(NamedTuple):
+    """The range that each channel of training motion stays in, z-scores; poses made beyond it are drawn back.
+
+    Errors of a frame are carried into the next, and in minutes they add up in channels that hardly move, as in ankles.
+    """
+
+    low: Float[Array, " C"]
+    high: Float[Array, " C"]
+
+    def kept(self, x: Float[Array, "B C"]) -> Float[Array, "B C"]:
+        """Poses with what lies beyond the range reduced by a half: a spring, so that nothing stops within a frame."""
+        return x - 0.5 * (x - jnp.clip(x, self.low[None], self.high[None]))
 
 
 class Networks:
@@ -211,6 +225,15 @@ class Networks:
         share = project_last(prepare(params["glow"]), scaled(self.config.style_controls, controls))
         return heard._replace(projected=tuple(a + b for a, b in zip(heard.projected, share, strict=True)))
 
+    @staticmethod
+    def limits(summary: Summary) -> Limits | None:
+        """Of training motion; None where a run keeps none."""
+        if "pose_low" not in summary:
+            return None
+        return Limits(
+            jnp.min(jnp.asarray(summary["pose_low"]), axis=0), jnp.max(jnp.asarray(summary["pose_high"]), axis=0)
+        )
+
     def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> Carried:
         """Before the first frame of so many sequences.
 
@@ -222,9 +245,13 @@ class Networks:
         return Carried(history, first_states(prepare(params["glow"]), self.shape, count))
 
     def proceed(
-        self, params: Params, z: Float[Array, "T B C"], heard: Heard, carried: Carried
+        self, params: Params, z: Float[Array, "T B C"], heard: Heard, carried: Carried, limits: Limits | None = None
     ) -> tuple[Float[Array, "T B C"], Carried]:
-        """Frames of latents one after another, each told of those before it."""
+        """Frames of latents one after another, each told of those before it.
+
+        Args:
+            limits: of :meth:`limits`; None for none. Within them the frames are the latents' own.
+        """
         prepared: Prepared = prepare(params["glow"])
         count = z.shape[1]
         unwhitening = inverse_whitening(params["predictor"]) if self.config.predictor else None
@@ -242,6 +269,8 @@ class Networks:
             x, states = glow_inverse_step(prepared, self.shape, latent, told, known, states)
             if unwhitening is not None:
                 x = predictor_inverse(params["predictor"], x, history, unwhitening)
+            if limits is not None:
+                x = limits.kept(x)
             return Carried(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), states), x
 
         after, x = jax.lax.scan(frame, carried, (z, heard.projected, heard.embedding))
