@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 #: What is meant where nothing is said.
-SHARE, MODE, MIX = 0.7, "repeat", 0.5
+SHARE, MODE, MIX = 0.9, "repeat", 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser, share: Callable[[str], Any]) -> None:
