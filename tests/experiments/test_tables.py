@@ -1,0 +1,73 @@
+"""Tables of the papers: records, intervals over seeds, and what is said of a claim."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from experiments.tables import records as store
+from experiments.tables.claims import Claim, difference, judge, over_seeds
+from experiments.tables.markdown import render
+from experiments.tables.records import all_tables, append, records
+
+TABLE = "audio2gestures/made_up"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "EXPERIMENTS", tmp_path)
+    return tmp_path / "audio2gestures" / "results"
+
+
+def add(variant, seed, value, steps=100):
+    score = {"mean": value, "low": None, "high": None, "best": None}
+    about = {"corpus": "c", "feature_network": None, "samples": 2, "steps": steps, "train_seconds": 60.0, "clips": 3}
+    append(TABLE, {"variant": variant, "seed": seed, **about, "scores": {"fgd": score}})
+
+
+def test_the_last_of_equal_records_counts_and_lines_are_json(folder):
+    add("a", 0, 1.0)
+    add("a", 0, 2.0)
+    add("a", 1, 3.0)
+    assert [record["scores"]["fgd"]["mean"] for record in records(TABLE)] == [2.0, 3.0]
+    assert all(json.loads(line) for line in (folder / "made_up.jsonl").read_text().splitlines())
+    assert list(all_tables("audio2gestures")) == [TABLE]
+    assert records("audio2gestures/none") == []
+
+
+def test_intervals_are_students(folder):
+    values = [1.0, 2.0, 4.0]
+    for seed, value in enumerate(values):
+        add("a", seed, value)
+    mean, half, count = over_seeds(TABLE, "a", "fgd")
+    low, high = stats.t.interval(0.95, 2, loc=np.mean(values), scale=stats.sem(values))
+    np.testing.assert_allclose([mean - half, mean + half, count], [low, high, 3])
+    assert over_seeds(TABLE, "b", "fgd") is None
+
+
+def test_differences_are_paired_by_seed_and_claims_judged_by_them(folder):
+    claim = Claim("b is larger", "b", "a", "fgd", 1)
+    for seed, (a, b) in enumerate([(1.0, 2.0), (5.0, 6.1)]):
+        add("a", seed, a)
+        add("b", seed, b)
+    assert judge(TABLE, claim) == "undecided: fewer than 3 seeds"
+    add("a", 2, 9.0)
+    assert difference(TABLE, "b", "a", "fgd")[2] == 2  # seed 2 has no partner yet
+    add("b", 2, 9.9)
+    assert judge(TABLE, claim).startswith("holds: +1")
+    assert judge(TABLE, Claim("b is smaller", "b", "a", "fgd", -1)).startswith("does not hold: +1")
+    add("b", 2, 3.0)
+    assert judge(TABLE, claim).startswith("undecided")
+
+
+def test_a_table_shows_its_rows_its_budget_and_what_it_is_not(folder):
+    for seed in range(3):
+        add("ours", seed, 1.0 + seed)
+    add("truth", 0, 0.0, steps=0)
+    text = render(TABLE, "Made up", ["ours", "not run"], (), {"ours": "FID 2.22"})
+    assert "| ours | 3 | 2.00 +- 2.48 |" in text
+    assert "| truth | 1 | 0.00 |" in text
+    assert "not run" not in text
+    assert "3 minutes of training" in text
+    assert "other data" in text
