@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.tables.records import records
+from experiments.tables.records import current
 
 
 def over_seeds(table: str, variant: str, metric: str) -> tuple[float, float, int] | None:
     """Mean over seeds of a score, half the width of its 95 % interval (Student's t), and the number of seeds."""
-    return _interval([r["scores"][metric]["mean"] for r in records(table) if _has(r, variant, metric)])
+    return _interval([r["scores"][metric]["mean"] for r in current(table) if _has(r, variant, metric)])
 
 
 def best_over_seeds(table: str, variant: str, metric: str) -> float | None:
     """Mean over seeds of the best sample's score."""
-    values = [r["scores"][metric]["best"] for r in records(table) if _has(r, variant, metric)]
+    values = [r["scores"][metric]["best"] for r in current(table) if _has(r, variant, metric)]
     values = [value for value in values if value is not None]
     return float(np.mean(values)) if values else None
 
@@ -40,7 +40,7 @@ def _interval(values: Sequence[float]) -> tuple[float, float, int] | None:
 def difference(table: str, first: str, second: str, metric: str) -> tuple[float, float, int] | None:
     """Interval of ``first - second``, paired by seed."""
     by_seed: dict[int, dict[str, float]] = {}
-    for record in records(table):
+    for record in current(table):
         for name in (first, second):
             if _has(record, name, metric):
                 by_seed.setdefault(record["seed"], {})[name] = record["scores"][metric]["mean"]

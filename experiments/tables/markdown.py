@@ -6,7 +6,7 @@ from typing import Any
 from a2g_jax.evaluation.scores import METRICS as SCORED
 from a2g_jax.evaluation.scores import Metric
 from experiments.tables.claims import Claim, best_over_seeds, judge, over_seeds
-from experiments.tables.records import path_of, records
+from experiments.tables.records import current, path_of
 from experiments.tables.runs import (
     Score,
     Setting,
@@ -76,7 +76,10 @@ def compute(
 def draw(
     table: str, title: str, variants: Mapping[str, Variant], claims: Sequence[Claim], paper: Mapping[str, str]
 ) -> None:
-    """Write a table's Markdown beside its records, and print it."""
+    """Write a table's Markdown beside its records, and print it; nothing while there are no records."""
+    if not current(table):
+        print(f"{table}: nothing is measured yet; name a corpus with --corpus.")
+        return
     text = render(table, title, list(variants), claims, paper)
     path_of(table, ".md").write_text(text + "\n", encoding="utf-8")
     print(text)
@@ -90,7 +93,7 @@ def render(
     paper: Mapping[str, str],
 ) -> str:
     """Markdown with our table, what the paper reports and whether its claims hold here."""
-    found = records(table)
+    found = current(table)
     columns = [
         name for name in (*COLUMNS, *_OTHERS[table.split("/")[0]]) if any(name in record["scores"] for record in found)
     ]

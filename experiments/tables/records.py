@@ -10,6 +10,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+#: What records of one table have in common, beside the steps of those that were trained.
+_MEASURED = ("corpus", "feature_network", "samples")
+
 EXPERIMENTS = Path(__file__).parents[1]
 
 #: What tells one record of a table from another.
@@ -41,6 +44,18 @@ def records(table: str) -> list[dict[str, Any]]:
     found = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     # Two processes that worked at once may both have scored what has no training.
     return list({tuple(record.get(name) for name in _IDENTITY): record for record in found}.values())
+
+
+def current(table: str) -> list[dict[str, Any]]:
+    """Records that can stand in one table: those of the corpus, feature network, samples and steps of the last trained
+    one, and what has no training on the same corpus and network."""
+    found = records(table)
+    trained = [record for record in found if record["steps"] > 0]
+    if not trained:
+        return found
+    last = trained[-1]
+    same = [record for record in found if all(record.get(name) == last.get(name) for name in _MEASURED)]
+    return [record for record in same if record["steps"] in (0, last["steps"])]
 
 
 def append(table: str, record: Mapping[str, Any]) -> None:

@@ -61,6 +61,17 @@ def test_differences_are_paired_by_seed_and_claims_judged_by_them(folder):
     assert judge(TABLE, claim).startswith("undecided")
 
 
+def test_runs_of_other_lengths_do_not_stand_in_one_table(folder):
+    add("truth", 0, 0.0, steps=0)
+    for seed in range(3):
+        add("ours", seed, 9.0, steps=50)
+        add("ours", seed, 1.0, steps=100)
+    assert over_seeds(TABLE, "ours", "fgd")[0] == 1.0
+    assert over_seeds(TABLE, "truth", "fgd")[0] == 0.0
+    add("ours", 0, 4.0, steps=200)
+    assert over_seeds(TABLE, "ours", "fgd")[::2] == (4.0, 1)
+
+
 def test_a_table_shows_its_rows_its_budget_and_what_it_is_not(folder):
     for seed in range(3):
         add("ours", seed, 1.0 + seed)
