@@ -77,7 +77,7 @@ def main() -> None:
         if place.corpus is not None:
             with_nulls(table, place, PROTOCOLS[protocol])
             only = options.only.split(",") if options.only else None
-            compute(table, rows(protocol), place, only, continued(PROTOCOLS[protocol]))
+            compute(table, rows(protocol), place, only, continued(PROTOCOLS[protocol]), protocol)
         draw(table, f"Table 1, by the protocol of {protocol.capitalize()}", rows(protocol), CLAIMS, PAPER[protocol])
 
 

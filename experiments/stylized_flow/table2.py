@@ -55,7 +55,14 @@ def main() -> None:
     options = arguments("Table 2: the components of the flow").parse_args()
     if options.corpus is not None:
         with_nulls(TABLE, setting(options), TED)
-        compute(TABLE, VARIANTS, setting(options), options.only.split(",") if options.only else None, score)
+        compute(
+            TABLE,
+            VARIANTS,
+            setting(options),
+            options.only.split(",") if options.only else None,
+            score,
+            "ted, with bits",
+        )
     draw(TABLE, "Table 2: the components of the stylized flow", VARIANTS, CLAIMS, PAPER)
 
 

@@ -8,6 +8,7 @@ from a2g_jax.evaluation.scores import Metric
 from experiments.tables.claims import Claim, best_over_seeds, judge, over_seeds
 from experiments.tables.records import current, path_of
 from experiments.tables.runs import (
+    WHOLE,
     Score,
     Setting,
     Variant,
@@ -66,11 +67,12 @@ def compute(
     where: Setting,
     only: Sequence[str] | None,
     score: Score = whole_recordings,
+    scored: str = WHOLE,
 ) -> None:
     """Train and score what is missing."""
-    if score is whole_recordings:
+    if scored == WHOLE:
         baselines(table, where)
-    run_table(table, variants, where, only, score)
+    run_table(table, variants, where, only, score, scored)
 
 
 def draw(

@@ -48,6 +48,10 @@ class Ruler:
 Score = Callable[[str, Run, Ruler, int], dict[str, Any]]
 
 
+#: What :func:`whole_recordings` is called in records.
+WHOLE = "whole recordings"
+
+
 def whole_recordings(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
     """Scores on whole test recordings, and whether the model listens: what ``a2g evaluate --audit`` says."""
     result = evaluate(
@@ -109,8 +113,13 @@ def run_table(
     where: Setting,
     only: Sequence[str] | None = None,
     score: Score = whole_recordings,
+    scored: str = WHOLE,
 ) -> None:
-    """Train and score every variant with every seed that has no record yet, seed by seed."""
+    """Train and score every variant with every seed that has no record yet, seed by seed.
+
+    Args:
+        scored: what ``score`` is called; records of one run that were scored alike serve several tables.
+    """
     began = time.monotonic()
     ruler, measured = measure(where)
     corpus = ruler.corpus
@@ -126,7 +135,7 @@ def run_table(
                 print(f"{table}: the budget of {where.minutes:g} minutes is used up; run it again to go on")
                 return
             digest, described = _described(name, variant, variants, seed, corpus, where)
-            twin = _same(table, digest, conditions)
+            twin = _same(table, digest, conditions, scored)
             if twin is not None:
                 append(table, {**twin, "variant": name})
                 continue
@@ -134,6 +143,7 @@ def run_table(
             record = {
                 **wanted,
                 "settings": digest,
+                "scored": scored,
                 "model": variant.model,
                 "changes": {**variant.changes, **(variant.generation or {})},
                 "train_seconds": seconds,
@@ -211,11 +221,12 @@ def _digest(described: RunConfig, generation: Mapping[str, Any] | None) -> str:
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _same(table: str, digest: str, conditions: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The record of a variant of any table of the paper that is the same under another name."""
+def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -> dict[str, Any] | None:
+    """The record of a variant of any table of the paper that is the same under another name, and scored alike."""
     for name in all_tables(table.split("/")[0]):
         for record in records(name):
-            if record.get("settings") == digest and all(record[key] == value for key, value in conditions.items()):
+            same = record.get("settings") == digest and record.get("scored", WHOLE) == scored
+            if same and all(record[key] == value for key, value in conditions.items()):
                 return record
     return None
 

@@ -10,6 +10,7 @@ from experiments.tables import records as store
 from experiments.tables.claims import Claim, difference, judge, over_seeds
 from experiments.tables.markdown import render
 from experiments.tables.records import all_tables, append, records
+from experiments.tables.runs import WHOLE, _same
 
 TABLE = "audio2gestures/made_up"
 
@@ -82,3 +83,12 @@ def test_a_table_shows_its_rows_its_budget_and_what_it_is_not(folder):
     assert "not run" not in text
     assert "3 minutes of training" in text
     assert "other data" in text
+
+
+def test_a_record_serves_another_table_only_if_it_was_scored_alike(folder):
+    conditions = {"corpus": "c", "steps": 100}
+    append("audio2gestures/first", {"variant": "a", "seed": 0, **conditions, "settings": "d", "scored": "speakers"})
+    assert _same("audio2gestures/second", "d", conditions, "speakers")["variant"] == "a"
+    assert _same("audio2gestures/second", "d", conditions, WHOLE) is None
+    assert _same("audio2gestures/second", "d", {**conditions, "steps": 50}, "speakers") is None
+    assert _same("stylized_flow/second", "d", conditions, "speakers") is None
