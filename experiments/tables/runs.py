@@ -12,6 +12,7 @@ from typing import Any
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.evaluate import evaluate
 from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_network
+from a2g_jax.io.files import write_json
 from a2g_jax.models import find_model
 from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.feature_run import load_perceptual
@@ -33,6 +34,8 @@ class Variant:
     """Changes of settings that act in generation alone, made after training the variant of that name."""
     trained_as: str = ""
     """The variant whose weights it takes; empty for its own."""
+    steps: float = 1.0
+    """Steps of its training, in those of the table: above 1 where a step costs less and computing is to be equal."""
 
 
 @dataclass(frozen=True)
@@ -134,19 +137,21 @@ def run_table(
             if (time.monotonic() - began) / 60 > where.minutes:
                 print(f"{table}: the budget of {where.minutes:g} minutes is used up; run it again to go on")
                 return
-            digest, described = _described(name, variant, variants, seed, corpus, where)
+            digest, config = described(name, variant, variants, seed, corpus, where)
             twin = _same(table, digest, conditions, scored)
             if twin is not None:
                 append(table, {**twin, "variant": name})
                 continue
-            run, seconds = _trained(described, variant, corpus, where)
+            run, seconds, computing = _trained(config, variant, corpus, where)
             record = {
                 **wanted,
                 "settings": digest,
                 "scored": scored,
                 "model": variant.model,
                 "changes": {**variant.changes, **(variant.generation or {})},
+                "trained_steps": config.train_config.steps,
                 "train_seconds": seconds,
+                "train_cpu_seconds": computing,
                 **score(name, run, ruler, seed),
             }
             append(table, record)
@@ -189,35 +194,36 @@ def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
     return Ruler(corpus, network, where.samples), measured
 
 
-def _described(
+def described(
     name: str, variant: Variant, variants: Mapping[str, Variant], seed: int, corpus: Corpus, where: Setting
 ) -> tuple[str, RunConfig]:
     """The run that a variant is made of, and a digest of everything that its scores depend on."""
     made = variants.get(variant.trained_as or name, variant)
+    steps = round(where.steps * made.steps)
     preset = find_model(made.model).presets[made.preset]
     config = replace(preset, **made.changes)
     # Ramps that end before the training does.
     ramps = {
-        name: min(getattr(config, name), where.steps // 3)
+        name: min(getattr(config, name), steps // 3)
         for name in ("kl_ramp_steps", "alignment_ramp_steps")
         if hasattr(config, name)
     }
     config = replace(config, **ramps)
     training = replace(
         TRAIN_PRESETS["tiny"],
-        steps=where.steps,
-        **{"warmup_steps": min(300, where.steps // 10), **(variant.training or {})},
+        steps=steps,
+        **{"warmup_steps": min(300, steps // 10), **(variant.training or {})},
         seed=seed,
-        validate_every=where.steps,
+        validate_every=steps,
     )
     needs = any(getattr(config, name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
     perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
-    described = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
-    return _digest(described, variant.generation), described
+    run = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
+    return _digest(run, variant.generation), run
 
 
-def _digest(described: RunConfig, generation: Mapping[str, Any] | None) -> str:
-    values = {**run_to_json(described, 0), "generation": dict(generation or {}), "package": None}
+def _digest(config: RunConfig, generation: Mapping[str, Any] | None) -> str:
+    values = {**run_to_json(config, 0), "generation": dict(generation or {}), "package": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -231,17 +237,22 @@ def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -
     return None
 
 
-def _trained(described: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Any, float]:
-    """The run of a variant, trained now if it was not before, and the seconds that its training took."""
-    folder = where.runs / _digest(described, None)
-    began = time.monotonic()
-    train(described, corpus, folder, resume=True, progress=False)
-    seconds = time.monotonic() - began
+def _trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Run, float, float]:
+    """The run of a variant, trained now if it was not before, and the seconds of the call that finished it: passed,
+    and computed."""
+    folder = where.runs / _digest(config, None)
+    began, computed = time.monotonic(), time.process_time()
+    train(config, corpus, folder, resume=True, progress=False)
+    spent = folder / "seconds.json"
+    # Another table may ask for the run again; its training took what it took.
+    if not spent.exists():
+        write_json(spent, [time.monotonic() - began, time.process_time() - computed])
+    seconds, computing = json.loads(spent.read_text(encoding="utf-8"))
     run = load_run(folder)
     if variant.generation:
         settings = replace(run.config.model_config, **variant.generation)
         run = replace(run, config=replace(run.config, model_config=settings))
-    return run, seconds
+    return run, seconds, computing
 
 
 def _line(record: Mapping[str, Any]) -> str:

@@ -1,0 +1,44 @@
+"""Bits per dimension beside the scores of continued clips, and the row of the conditional Gaussian."""
+
+from typing import Any
+
+from a2g_jax.evaluation.likelihood import Likelihood, bits_per_dim, gaussian_bits_per_dim
+from a2g_jax.training.run import Run
+from experiments.stylized_flow.protocol import Protocol, continued
+from experiments.tables.records import append, records
+from experiments.tables.runs import Ruler, Score, Setting, Variant, described, measure
+
+GAUSSIAN = "conditional Gaussian"
+
+
+def continued_with_bits(protocol: Protocol) -> Score:
+    """A score of runs: continued clips, and for flows the bits per dimension of held-out motion (with noise)."""
+    scored = continued(protocol)
+
+    def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
+        found: dict[str, Any] = scored(name, run, ruler, seed)
+        if run.config.build().score is not None:
+            found["scores"]["bits_per_dim"] = _row(bits_per_dim(run, ruler.corpus, seed=seed))
+        return found
+
+    return score
+
+
+def with_gaussian(table: str, where: Setting, variant: Variant) -> None:
+    """Score the Gaussian that is told what a flow is told, for every seed that has no record yet.
+
+    Args:
+        variant: the flow; its clips, history, lookahead and noise are those of the Gaussian.
+    """
+    ruler, measured = measure(where)
+    for seed in where.seeds:
+        wanted = {"variant": GAUSSIAN, "seed": seed, **measured, "steps": 0}
+        if any(wanted.items() <= record.items() for record in records(table)):
+            continue
+        _, config = described("", variant, {}, seed, ruler.corpus, where)
+        found = gaussian_bits_per_dim(config, ruler.corpus, seed=seed)
+        append(table, {**wanted, "floor": found.floor, "scores": {"bits_per_dim": _row(found)}})
+
+
+def _row(found: Likelihood) -> dict[str, Any]:
+    return {**found.noisy._asdict(), "best": None}
