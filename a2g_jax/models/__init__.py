@@ -24,7 +24,7 @@ MODELS: dict[str, Entry] = {
         audio2gestures.Audio2GesturesConfig,
         audio2gestures.PRESETS,
         audio2gestures.build,
-        ("6d", "directions", "keypoints"),
+        tuple(WIDTHS),
     ),
     "speech2gesture": Entry(
         speech2gesture.Speech2GestureConfig, speech2gesture.PRESETS, speech2gesture.build, tuple(WIDTHS)

@@ -11,18 +11,20 @@ from experiments.tables.markdown import make
 from experiments.tables.runs import Variant
 
 VARIANTS = {
-    "baseline (TCN, no split)": Variant({**BASE, "split": False, "sample_codes": True}),
+    "baseline (TCN without split)": Variant({**BASE, "split": False, "sample_codes": True}),
     "A2G (TCN)": Variant(BASE),
     "A2G (GRU)": Variant({**BASE, "backbone": "gru"}),
     "A2G (Transformer)": Variant({**BASE, "backbone": "transformer"}),
 }
 
 CLAIMS = (
-    Claim("GRU multimodality is far above the baseline's", "A2G (GRU)", "baseline (TCN, no split)", "multimodality", 1),
+    Claim(
+        "GRU multimodality is far above the baseline's", "A2G (GRU)", "baseline (TCN without split)", "multimodality", 1
+    ),
     Claim(
         "Transformer multimodality is above the baseline's",
         "A2G (Transformer)",
-        "baseline (TCN, no split)",
+        "baseline (TCN without split)",
         "multimodality",
         1,
     ),

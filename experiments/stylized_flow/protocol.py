@@ -101,9 +101,10 @@ def scores_of(
     if made.shape[1] > 1:
         spread = [body.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
         summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
-    # Between the first samples of different clips, as the paper has it; not within a long motion.
-    apart = body.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
-    summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
+    if len(made) > 1:
+        # Between the first samples of different clips, as the paper has it; not within a long motion.
+        apart = body.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
+        summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
     if ruler.network is not None:
         features = lambda poses: np.concatenate([ruler.network.clip_features(one) for one in poses])  # noqa: E731
         reference = features([one[inner] for one in pose])

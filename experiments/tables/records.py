@@ -5,10 +5,14 @@ A table is named by its paper and its own name, ``audio2gestures/table2``; its r
 table can be drawn from what there is.
 """
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from a2g_jax.data.corpus import Corpus
 
 #: What records of one table have in common, beside the steps of those that were trained.
 _MEASURED = ("corpus", "feature_network", "samples")
@@ -17,6 +21,22 @@ EXPERIMENTS = Path(__file__).parents[1]
 
 #: What tells one record of a table from another.
 _IDENTITY = ("variant", "seed", "corpus", "feature_network", "steps", "samples")
+
+
+def name_of(corpus: Corpus) -> str:
+    """What records call a corpus: a digest of its arrays, or of its recipe if it was generated.
+
+    The same recipe gives the same recordings everywhere, but processors differ in the last bits of a sum.
+    """
+    if corpus.recipe.get("reader") != "talker":
+        return corpus.fingerprint[:16]
+    recipe = {key: value for key, value in corpus.recipe.items() if key in _RECIPE}
+    about = [recipe, corpus.representation, corpus.fps, asdict(corpus.mel)]
+    return f"talker {hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:9]}"
+
+
+#: What of a recipe decides on the recordings.
+_RECIPE = frozenset({"minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"})
 
 
 def results(paper: str) -> Path:

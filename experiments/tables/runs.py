@@ -18,7 +18,7 @@ from a2g_jax.training.config import TRAIN_PRESETS
 from a2g_jax.training.feature_run import load_perceptual
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, load_run, run_to_json
-from experiments.tables.records import all_tables, append, records
+from experiments.tables.records import all_tables, append, name_of, records
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,8 @@ def run_table(
                 append(table, {**twin, "variant": name})
                 continue
             run, seconds, computing = _trained(config, variant, corpus, where)
+            if variant.trained_as:
+                seconds = computing = 0.0  # counted with the variant that was trained
             record = {
                 **wanted,
                 "settings": digest,
@@ -187,7 +189,7 @@ def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
     corpus = Corpus.open(where.corpus)
     network = None if where.features is None else load_feature_network(where.features, corpus)
     measured = {
-        "corpus": corpus.fingerprint[:16],
+        "corpus": name_of(corpus),
         "feature_network": None if network is None else network.fingerprint[:16],
         "samples": where.samples,
     }
@@ -219,11 +221,12 @@ def described(
     needs = any(getattr(config, name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
     perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
     run = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
-    return _digest(run, variant.generation), run
+    return _digest(run, corpus, variant.generation), run
 
 
-def _digest(config: RunConfig, generation: Mapping[str, Any] | None) -> str:
-    values = {**run_to_json(config, 0), "generation": dict(generation or {}), "package": None}
+def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | None) -> str:
+    about = {"corpus": name_of(corpus), "generation": dict(generation or {}), "package": None}
+    values = {**run_to_json(config, 0), **about}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -240,7 +243,7 @@ def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -
 def _trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Run, float, float]:
     """The run of a variant, trained now if it was not before, and the seconds of the call that finished it: passed,
     and computed."""
-    folder = where.runs / _digest(config, None)
+    folder = where.runs / _digest(config, corpus, None)
     began, computed = time.monotonic(), time.process_time()
     train(config, corpus, folder, resume=True, progress=False)
     spent = folder / "seconds.json"

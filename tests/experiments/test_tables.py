@@ -1,16 +1,19 @@
 """Tables of the papers: records, intervals over seeds, and what is said of a claim."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from a2g_jax.features.mel import MelConfig
 from experiments.tables import records as store
 from experiments.tables.claims import Claim, difference, judge, over_seeds
 from experiments.tables.markdown import render
-from experiments.tables.records import all_tables, append, records
-from experiments.tables.runs import WHOLE, _same
+from experiments.tables.records import all_tables, append, name_of, records
+from experiments.tables.runs import WHOLE, Setting, Variant, _same, described
 
 TABLE = "audio2gestures/made_up"
 
@@ -92,3 +95,35 @@ def test_a_record_serves_another_table_only_if_it_was_scored_alike(folder):
     assert _same("audio2gestures/second", "d", conditions, WHOLE) is None
     assert _same("audio2gestures/second", "d", {**conditions, "steps": 50}, "speakers") is None
     assert _same("stylized_flow/second", "d", conditions, "speakers") is None
+
+
+def corpus(recipe, fingerprint="f" * 64):
+    mel = MelConfig()
+    return SimpleNamespace(recipe=recipe, fingerprint=fingerprint, representation="6d", fps=30.0, mel=mel)
+
+
+def test_a_generated_corpus_is_known_by_its_recipe_and_a_recorded_one_by_its_arrays():
+    recipe = {"reader": "talker", "minutes": 90.0, "seed": 6, "roles": ["as", "drawn"]}
+    ours = name_of(corpus(recipe))
+    assert ours == name_of(corpus(recipe, "0" * 64))
+    assert ours.startswith("talker ")
+    assert name_of(corpus({**recipe, "seed": 7})) != ours
+    assert name_of(corpus({"reader": "beat"})) == "f" * 16
+
+
+def test_rows_of_equal_computing_say_their_steps_and_seconds(folder):
+    score = {"fgd": {"mean": 1.0, "low": None, "high": None, "best": None}}
+    for name, trained, seconds in (("ours", 100, 60.0), ("theirs", 140, 58.0)):
+        about = {"corpus": "c", "feature_network": None, "samples": 2, "steps": 100, "clips": 3, "train_seconds": 60.0}
+        spent = {"trained_steps": trained, "train_cpu_seconds": seconds}
+        append(TABLE, {"variant": name, "seed": 0, **about, **spent, "scores": score})
+    text = render(TABLE, "Made up", ["ours", "theirs"], (), {})
+    assert "- ours: 100 steps, 60 s" in text
+    assert "- theirs: 140 steps, 58 s" in text
+
+
+def test_a_row_may_have_more_steps_than_its_table(toy_corpus):
+    where = Setting(toy_corpus.path, None, Path("runs"), 100, 2, (0,), 1.0)
+    rows = {"plain": Variant({}), "longer": Variant({}, steps=1.5), "edited": Variant({}, trained_as="longer")}
+    steps = {name: described(name, row, rows, 0, toy_corpus, where)[1].train_config.steps for name, row in rows.items()}
+    assert steps == {"plain": 100, "longer": 150, "edited": 150}

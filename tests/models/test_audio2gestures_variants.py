@@ -7,11 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jax.test_util import check_grads
+from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.poses import PoseLayout
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.rotation import matrix_to_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures import PRESETS, build
 from a2g_jax.models.audio2gestures.codec import Networks
@@ -33,6 +35,14 @@ KEYPOINTS = Data(
     Statistics(RNG.normal(size=(JOINTS, 2)).astype(np.float32), np.full((JOINTS, 2), 3.0, np.float32)),
     "keypoints",
 )
+EXPONENTIAL = Data(
+    SKELETON,
+    20.0,
+    BANDS,
+    Statistics(RNG.normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), np.full((JOINTS, 3), 0.5, np.float32)),
+    "exponential",
+)
+OTHER_POSES = {"keypoints": KEYPOINTS, "exponential": EXPONENTIAL}
 BASE = replace(
     PRESETS["tiny"],
     audio_channels=(6,),
@@ -74,9 +84,9 @@ def params_of(model, dtype=np.float32):
     return jax.tree.map(fill, jax.eval_shape(model.init, jax.random.key(0)))
 
 
-@pytest.mark.parametrize("name", ["gru", "transformer", "dct", "no split", "keypoints"])
+@pytest.mark.parametrize("name", ["gru", "transformer", "dct", "no split", "keypoints", "exponential"])
 def test_every_parameter_learns(name):
-    data = KEYPOINTS if name == "keypoints" else DATA
+    data = OTHER_POSES.get(name, DATA)
     model = build(replace(BASE, **VARIANTS.get(name, {})), data)
     params = params_of(model)
     step = jax.jit(jax.value_and_grad(model.loss, has_aux=True))
@@ -89,6 +99,18 @@ def test_every_parameter_learns(name):
     assert ("bicycle" in terms) == (name != "no split")
     assert ("mapping_net" in params) == (name not in ("no split", "no mapping"))
     assert ("kl_shared" in terms) == (name != "dct")
+
+
+def test_exponential_maps_are_the_rotations_they_stand_for():
+    """The losses on poses see the same body whichever way its rotations are written down."""
+    pose = jnp.asarray(np.random.default_rng(4).normal(scale=0.5, size=(2, FRAMES, JOINTS, 3)), jnp.float32)
+    networks = Networks(BASE, EXPONENTIAL)
+    rotations, places = networks.places(pose)
+    expected = Rotation.from_rotvec(np.asarray(pose).reshape(-1, 3)).as_matrix().reshape(*pose.shape, 3)
+    np.testing.assert_allclose(rotations, expected, atol=1e-5)
+    same = Networks(BASE, DATA).places(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
+    np.testing.assert_allclose(places, same[1], atol=1e-5)
+    np.testing.assert_array_equal(networks.valid(pose, rotations), pose)
 
 
 @pytest.mark.parametrize("name", ["transformer", "dct", "no split", "no mapping"])

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Key
 
 from a2g_jax.features.dct import block_idct
 from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.networks import AudioEncoder, Decoder, Gaussian, MappingNet, MotionEncoder
 from a2g_jax.models.base import Data, Params
@@ -80,7 +80,10 @@ class Networks:
         specific: Float[Array, "B T C"] | None,
         dropout_key=None,
     ) -> Float[Array, "B T R D"]:
-        """Motion of a full code in time: 6D vectors that Gram-Schmidt makes rotations, or values as they are."""
+        """Motion of a full code in time: 6D vectors that Gram-Schmidt makes rotations, or values as they are.
+
+        Exponential maps are not wrapped: those of a corpus are at most pi long, and speech turns no joint so far.
+        """
         flat = _apply(self.modules[2], params["decoder"], dropout_key, shared, specific)
         pose = flat.reshape(*flat.shape[:2], *self.data.pose_statistics.mean.shape)
         return self.data.pose_statistics.denormalise(pose) if self.normalises else pose
@@ -96,7 +99,7 @@ class Networks:
 
     @property
     def normalises(self) -> bool:
-        """Whether networks see z-scores: by the settings, and always where poses are no rotations."""
+        """Whether networks see z-scores: by the settings, and always where poses are not in 6D."""
         return self.config.normalise_pose or self.data.representation != "6d"
 
     def places(self, pose: Float[Array, "B T R D"]) -> tuple[Float[Array, "B T R 3 3"] | None, Float[Array, "B T R _"]]:
@@ -105,15 +108,17 @@ class Networks:
         Where poses are no rotations (2D keypoints, bone directions): None and the values as z-scores, which have no
         unit and are near 1 whatever the camera or the speaker.
         """
-        if self.data.representation != "6d":
+        turns = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle}.get(self.data.representation)
+        if turns is None:
             return None, self.data.pose_statistics.normalise(pose)
-        rotations, skeleton = matrix_from_6d(pose), self.data.skeleton
+        rotations, skeleton = turns(pose), self.data.skeleton
         return rotations, joint_positions(rotations, jnp.asarray(skeleton.offsets), skeleton.parents)
 
-    @staticmethod
-    def valid(pose: Float[Array, "B T R D"], rotations: Float[Array, "B T R 3 3"] | None) -> Float[Array, "B T R D"]:
-        """The pose that the rotations stand for, instead of the raw output; values as they are."""
-        return pose if rotations is None else matrix_to_6d(rotations)
+    def valid(
+        self, pose: Float[Array, "B T R D"], rotations: Float[Array, "B T R 3 3"] | None
+    ) -> Float[Array, "B T R D"]:
+        """In 6D the pose that the rotations stand for, instead of the raw output; other values as they are."""
+        return pose if rotations is None or self.data.representation != "6d" else matrix_to_6d(rotations)
 
     def _by_clip(self, encode: Callable[[Array], Any], x: Float[Array, "B T C"]) -> Any:
         """The codes of each block encoded on its own, as in training, where blocks are transformed (Sec. 6.3)."""
