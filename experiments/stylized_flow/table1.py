@@ -2,10 +2,10 @@
 
     a2g prepare talker --out TRINITY --minutes 90 --seed 6 --features stylized-flow
     a2g prepare talker --out TED --minutes 90 --seed 6 --view ted --features stylized-flow-ted
-    a2g train motion_autoencoder --corpus TRINITY --out FEATURES --clip-frames 64
-    a2g train motion_autoencoder --corpus TED --out FEATURES_TED --clip-frames 30
-    python -m experiments.stylized_flow.table1 --corpus TRINITY --features FEATURES \\
-        --corpus-ted TED --features-ted FEATURES_TED [--budget MINUTES]
+    python -m experiments.stylized_flow.table1 --corpus TRINITY --features experiments/features/talker_20fps \\
+        --corpus-ted TED --features-ted experiments/features/talker_ted [--budget MINUTES]
+
+The feature networks were made by ``a2g train motion_autoencoder --steps 2000`` with ``--clip-frames 64`` and 30.
 
 MoGlow is trained for as long as the flow, not for as many steps: once as published, once with our linear first layer.
 Without a corpus the tables are drawn from the records that there are. Also for corpora of real takes.
