@@ -3,9 +3,9 @@
     python -m experiments.audio2gestures.table1 --corpus CORPUS --features RUN \\
         --corpus-2d CORPUS --features-2d RUN [--budget MINUTES]
 
-The 2D corpus is one of ``a2g prepare talker --minutes 60 --seed 6 --view s2g --features audio2gestures-2d``: 49 keypoints
-at 15 fps, clips of 64 frames; its network is ``experiments/features/talker_2d`` (1000 steps). Without a corpus
-the tables are drawn from the records that there are.
+The 2D corpus is one of ``a2g prepare talker --minutes 60 --seed 6 --view s2g --features audio2gestures-2d``: 49
+keypoints at 15 fps, clips of 64 frames; its network is ``experiments/features/talker_2d`` (1000 steps). Without a
+corpus the tables are drawn from the records that there are.
 """
 
 from collections.abc import Mapping
