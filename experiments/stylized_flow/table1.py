@@ -18,7 +18,7 @@ from pathlib import Path
 from experiments.audio2gestures.settings import BASE
 from experiments.stylized_flow.bits import GAUSSIAN, continued_with_bits, with_gaussian
 from experiments.stylized_flow.protocol import PROTOCOLS
-from experiments.stylized_flow.settings import flow, moglow
+from experiments.stylized_flow.settings import OTHERS, flow, moglow
 from experiments.stylized_flow.tables import with_nulls
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
@@ -66,8 +66,8 @@ def rows(protocol: str) -> dict[str, Variant]:
         MOGLOW: moglow(protocol, predictor=False),
         LINEAR: moglow(protocol, predictor=True),
         OURS: flow(protocol),
-        A2G: Variant({**BASE, **clip}),
-        S2G: Variant({**clip, "adversarial_weight": 0.0}, model="speech2gesture"),
+        A2G: Variant({**BASE, **clip}, steps=OTHERS[protocol]["a2g"]),
+        S2G: Variant({**clip, "adversarial_weight": 0.0}, model="speech2gesture", steps=OTHERS[protocol]["s2g"]),
     }
 
 

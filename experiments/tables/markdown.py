@@ -101,7 +101,7 @@ def render(
         name for name in (*COLUMNS, *_OTHERS[table.split("/")[0]]) if any(name in record["scores"] for record in found)
     ]
     names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
-    head = " | ".join(f"{METRICS[name].title}{_unit(name)} {_ARROWS[METRICS[name].better]}" for name in columns)
+    head = " | ".join(f"{METRICS[name].title}{_unit(name, found)} {_ARROWS[METRICS[name].better]}" for name in columns)
     lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]
     for name in names:
         cells = [_cell(table, name, metric) for metric in columns]
@@ -124,8 +124,12 @@ def render(
     return "\n".join(lines)
 
 
-def _unit(name: str) -> str:
-    return f", {METRICS[name].unit}" if METRICS[name].unit else ""
+def _unit(name: str, found: Sequence[Mapping[str, Any]]) -> str:
+    """Lengths are centimetres and metres, or the corpus's own unit where it has no metres."""
+    unit = METRICS[name].unit
+    if any(record.get("unit", "cm") != "cm" for record in found):
+        unit = unit.replace("cm", "units").replace("m/", "units/")
+    return f", {unit}" if unit else ""
 
 
 def _cell(table: str, variant: str, metric: str) -> str:
