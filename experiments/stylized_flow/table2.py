@@ -27,6 +27,8 @@ CLAIMS = (
     Claim("the proposed model has a lower FGD than the baseline", FULL, BASELINE, "fgd", -1),
     Claim("the proposed model is more diverse than the baseline", FULL, BASELINE, "diversity", 1),
     Claim("L_gp without the encoder is no better than the baseline (FGD)", NO_ENCODER, BASELINE, "fgd", 1),
+    Claim("(ours) the global encoder lowers bits per dimension", FULL, NO_ENCODER, "bits_per_dim", -1),
+    Claim("(ours) bits per dimension are below the baseline's", FULL, BASELINE, "bits_per_dim", -1),
 )
 PAPER = {
     FULL: "FGD 3.30, PCK 0.850, diversity 52 mm",

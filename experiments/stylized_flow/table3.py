@@ -4,7 +4,8 @@
 
 The runs are those of Table 1. Latents of a clip are averaged over time and brought to two dimensions by t-SNE; CHI and
 silhouette are taken there, as the paper does, and in the full space, both *against the speakers* (the public code
-scores the labels of its own clustering). Beside them the same for speakers shuffled over the clips. Draws
+scores the labels of its own clustering). Beside them the same for speakers shuffled over the clips, and for the labels
+of a clustering (k-means, as many clusters as speakers), which says how well *any* cloud falls into pieces. Draws
 ``results/table3.png``.
 """
 
@@ -12,6 +13,7 @@ import argparse
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from a2g_jax.metrics.labels import calinski_harabasz, silhouette
 from a2g_jax.training.run import Run
@@ -46,7 +48,7 @@ def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
     chosen = np.linspace(0, len(points) - 1, min(_MOST, len(points))).round().astype(int)
     points, names = points[chosen], np.array(speakers)[chosen]
     _, labels = np.unique(names, return_inverse=True)
-    flat = TSNE(2, random_state=seed, init="pca", perplexity=30).fit_transform(points)
+    flat = np.round(TSNE(2, random_state=seed, init="pca", perplexity=30).fit_transform(points), 2)
     shuffled = np.random.default_rng(seed).permutation(labels)
     values = {
         "chi": calinski_harabasz(flat, labels),
@@ -55,13 +57,22 @@ def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
         "silhouette_full": silhouette(points, labels),
         "chi_shuffled": calinski_harabasz(flat, shuffled),
         "silhouette_shuffled": silhouette(flat, shuffled),
+        **own_clusters(flat, len(set(speakers)), seed),
     }
     return {
         "clips": len(points),
         "scores": {key: {"mean": value, "low": None, "high": None, "best": None} for key, value in values.items()},
-        "points": np.round(flat, 2).tolist(),
+        "points": flat.tolist(),
         "speakers": names.tolist(),
     }
+
+
+def own_clusters(flat: Float[np.ndarray, "N 2"], count: int, seed: int) -> dict[str, float]:
+    """What the public code scores: clusters that were found in the very same points."""
+    from sklearn.cluster import KMeans
+
+    labels = KMeans(count, n_init=10, random_state=seed).fit_predict(flat)
+    return {"chi_clusters": calinski_harabasz(flat, labels), "silhouette_clusters": silhouette(flat, labels)}
 
 
 def picture(found: list[dict[str, Any]]) -> None:

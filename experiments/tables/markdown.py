@@ -37,7 +37,7 @@ _OTHERS = {
     "audio2gestures": ("beat_alignment",),
     "stylized_flow": (
         *("beat_alignment", "jerk", "bits_per_dim", "chi", "silhouette", "chi_full", "silhouette_full"),
-        *("chi_shuffled", "silhouette_shuffled"),
+        *("chi_shuffled", "silhouette_shuffled", "chi_clusters", "silhouette_clusters"),
     ),
 }
 _T_SNE = "stylized flow, Table 3"
@@ -48,6 +48,8 @@ METRICS = {
     "silhouette_full": Metric("silhouette, full space", "", "higher", _T_SNE),
     "chi_shuffled": Metric("CHI, speakers shuffled", "", "truth", _T_SNE, 1),
     "silhouette_shuffled": Metric("silhouette, speakers shuffled", "", "truth", _T_SNE),
+    "chi_clusters": Metric("CHI, clusters instead of speakers", "", "truth", _T_SNE, 1),
+    "silhouette_clusters": Metric("silhouette, clusters instead of speakers", "", "truth", _T_SNE),
 }
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
 
