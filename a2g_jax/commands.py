@@ -1,6 +1,7 @@
 """What each subcommand of ``a2g`` does; the command line itself is in :mod:`a2g_jax.cli`."""
 
 import argparse
+import contextlib
 import dataclasses
 import os
 import textwrap
@@ -48,8 +49,19 @@ def _cache_compilations() -> None:
     """Keep compiled programs between runs; XLA compiles for seconds what it runs in milliseconds."""
     if os.environ.get("JAX_COMPILATION_CACHE_DIR") is None:
         cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
-        jax.config.update("jax_compilation_cache_dir", str(Path(cache) / "a2g_jax" / "xla"))
+        folder = Path(cache) / "a2g_jax" / "xla"
+        _drop_unfinished(folder)
+        jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_compilation_cache_max_size", 500_000_000)
+
+
+def _drop_unfinished(folder: Path) -> None:
+    """Remove programs without the note of their last use, left by a kill between the two: with one of them in the
+    folder JAX keeps no further program."""
+    for program in folder.glob("*-cache"):
+        if not program.with_name(program.name.removesuffix("cache") + "atime").exists():
+            with contextlib.suppress(OSError):
+                program.unlink()
 
 
 def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.cli import main
+from a2g_jax.commands import _drop_unfinished
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
@@ -210,3 +211,12 @@ def test_output_that_nobody_reads_to_the_end_is_no_error(tmp_path):
     script = f"{sys.executable} -m a2g_jax.cli prepare --list | (exec 0<&-; sleep 0.1)"
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.stderr == ""
+
+
+def test_programs_without_a_note_of_their_last_use_are_dropped(tmp_path):
+    """With one of them in the folder JAX keeps no further program."""
+    for name in ("whole-cache", "whole-atime", "killed-cache", "other.txt"):
+        (tmp_path / name).write_bytes(b"1")
+    _drop_unfinished(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["other.txt", "whole-atime", "whole-cache"]
+    _drop_unfinished(tmp_path / "not there")

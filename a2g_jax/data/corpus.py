@@ -321,6 +321,8 @@ def body_from_json(manifest: dict[str, Any]) -> Skeleton | PoseLayout:
     """Inverse of :func:`body_to_json`."""
     if "skeleton" in manifest:
         return skeleton_from_json(manifest["skeleton"])
+    if "layout" not in manifest:
+        raise KeyError("skeleton")
     layout = manifest["layout"]
     return PoseLayout(
         names=tuple(layout["names"]),

@@ -210,7 +210,10 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     except InputError:
         raise
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{folder}: is damaged ({error!r}); restore it or train again.") from None
+        what = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
+        raise InputError(
+            f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {what}); restore it or train again."
+        ) from None
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
     )

@@ -1,6 +1,6 @@
 """The full model of Table 2, trained three times as long: what its rhythm comes to.
 
-    python -m experiments.audio2gestures.long --corpus CORPUS --features RUN --steps 3000
+    python -m experiments.audio2gestures.long --corpus CORPUS --features RUN
 
 Table 2 stops where the shared code has just begun to be heard.
 """
@@ -11,4 +11,4 @@ from experiments.tables.markdown import make
 FULL = "+ diversity loss"
 
 if __name__ == "__main__":
-    make("audio2gestures/long", "The full model of Table 2, trained longer", {FULL: VARIANTS[FULL]}, (), {})
+    make("audio2gestures/long", "The full model of Table 2, trained longer", {FULL: VARIANTS[FULL]}, (), {}, steps=3000)

@@ -2,7 +2,7 @@
 
     a2g prepare beat DIR --out BEAT --fps 30 --random-split
     a2g prepare zeroeggs DIR --out ZEGGS --fps 30 --random-split
-    python -m experiments.audio2gestures.real --beat BEAT --zeroeggs ZEGGS [--steps 1000]
+    python -m experiments.audio2gestures.real --beat BEAT --zeroeggs ZEGGS [--steps 200]
 
 A take of a minute says little of a method: the intervals are over clips of one recording and over seeds. There is no
 feature network, because a network trained on a minute of motion measures nothing. Weights trained on research-only
@@ -43,7 +43,7 @@ CLAIMS = (
 
 def main() -> None:
     """Train and score what is missing, and draw a table for each take."""
-    parser = arguments("Real takes: the first part trains, the rest is scored")
+    parser = arguments("Real takes: the first part trains, the rest is scored", steps=200)
     parser.add_argument("--beat", type=Path, help="a corpus of BEAT, at 30 fps")
     parser.add_argument("--zeroeggs", type=Path, help="a corpus of ZeroEGGS, at 30 fps")
     options = parser.parse_args()

@@ -77,7 +77,7 @@ TABLES = {
 
 def main() -> None:
     """Train and score what is missing, and draw both tables."""
-    parser = arguments("Table 1: comparison with Speech2Gesture, in 3D and 2D")
+    parser = arguments("Table 1: comparison with Speech2Gesture, in 3D and 2D", steps=500)
     parser.add_argument("--corpus-2d", type=Path, help="made by 'a2g prepare talker --view s2g'")
     parser.add_argument("--features-2d", type=Path, help="a run of motion_autoencoder on it")
     options = parser.parse_args()

@@ -54,4 +54,4 @@ PAPER = {
 }
 
 if __name__ == "__main__":
-    make("audio2gestures/table6", "Table 6: edits of latent DCT bands", VARIANTS, CLAIMS, PAPER)
+    make("audio2gestures/table6", "Table 6: edits of latent DCT bands", VARIANTS, CLAIMS, PAPER, steps=2000)

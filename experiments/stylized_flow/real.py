@@ -3,7 +3,7 @@
     a2g prepare zeroeggs DIR --out ZEGGS --features stylized-flow --random-split
     a2g prepare beat DIR --out BEAT --features stylized-flow --fps 20 --random-split
     a2g prepare ted-expressive DIR --out TED --features stylized-flow-ted --random-split
-    python -m experiments.stylized_flow.real --zeroeggs ZEGGS --beat BEAT --ted TED [--steps 300]
+    python -m experiments.stylized_flow.real --zeroeggs ZEGGS --beat BEAT --ted TED [--steps 100]
 
 A take of a minute says little of a method, and its end is one clip of the Trinity protocol or two. There is no feature
 network, because a network trained on a minute of motion measures nothing; so there is no FGD and no perceptual loss.
@@ -44,7 +44,7 @@ def without_perceptual(protocol: str) -> dict[str, Variant]:
 
 def main() -> None:
     """Train and score what is missing, and draw a table for each take."""
-    parser = arguments("Real takes: the first part trains, the end is scored")
+    parser = arguments("Real takes: the first part trains, the end is scored", steps=100)
     for name, protocol in TAKES.items():
         parser.add_argument(f"--{name}", type=Path, help=f"a corpus with the features of the {protocol} protocol")
     options = parser.parse_args()

@@ -8,7 +8,7 @@
 The feature networks were made by ``a2g train motion_autoencoder --steps 2000`` with ``--clip-frames 64`` and 30.
 
 MoGlow is trained for as long as the flow, not for as many steps: once as published, once with our linear first layer.
-Without a corpus the tables are drawn from the records that there are. Also for corpora of real takes.
+Without a corpus the tables are drawn from the records that there are.
 """
 
 import argparse
@@ -79,17 +79,17 @@ def ted_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main() -> None:
     """Train and score what is missing, and draw both tables."""
-    parser = arguments("Table 1: the flow beside the models that there are")
+    parser = arguments("Table 1: the flow beside the models that there are", steps=700)
     ted_arguments(parser)
-    parser.add_argument("--name", default="table1", help="of the tables' files (default: table1), for real takes")
+    parser.add_argument("--steps-ted", type=int, default=600, help="training steps on TED (default: 600)")
     options = parser.parse_args()
     where = setting(options)
     given = {
         "trinity": where,
-        "ted": replace(where, corpus=options.corpus_ted, features=options.features_ted),
+        "ted": replace(where, corpus=options.corpus_ted, features=options.features_ted, steps=options.steps_ted),
     }
     for protocol, place in given.items():
-        table = f"stylized_flow/{options.name}_{protocol}"
+        table = f"stylized_flow/table1_{protocol}"
         if place.corpus is not None:
             with_nulls(table, place, PROTOCOLS[protocol])
             with_gaussian(table, place, flow(protocol))

@@ -40,7 +40,7 @@ PAPER = {
 
 def main() -> None:
     """Train and score what is missing, and draw the table."""
-    options = arguments("Table 2: the components of the flow").parse_args()
+    options = arguments("Table 2: the components of the flow", steps=600).parse_args()
     if options.corpus is not None:
         where, only = setting(options), options.only.split(",") if options.only else None
         with_nulls(TABLE, where, TED)

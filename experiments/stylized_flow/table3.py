@@ -103,7 +103,7 @@ def picture(found: list[dict[str, Any]]) -> None:
 
 def main() -> None:
     """Train and score what is missing; draw the table and the picture."""
-    options: argparse.Namespace = arguments("Table 3: speakers in the space of latents").parse_args()
+    options: argparse.Namespace = arguments("Table 3: speakers in the space of latents", steps=600).parse_args()
     if options.corpus is not None:
         compute(TABLE, VARIANTS, setting(options), options.only.split(",") if options.only else None, score, "speakers")
     draw(TABLE, "Table 3: speakers in the space of latents", VARIANTS, CLAIMS, PAPER)

@@ -55,10 +55,15 @@ _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
 
 
 def make(
-    table: str, title: str, variants: Mapping[str, Variant], claims: Sequence[Claim], paper: Mapping[str, str]
+    table: str,
+    title: str,
+    variants: Mapping[str, Variant],
+    claims: Sequence[Claim],
+    paper: Mapping[str, str],
+    steps: int = 1000,
 ) -> None:
     """The command of a table: train and score what is missing, and draw it; without a corpus, only draw it."""
-    options = arguments(title).parse_args()
+    options = arguments(title, steps).parse_args()
     if options.corpus is not None:
         compute(table, variants, setting(options), options.only.split(",") if options.only else None)
     draw(table, title, variants, claims, paper)

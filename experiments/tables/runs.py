@@ -89,13 +89,17 @@ class Setting:
     """No new training begins after so long."""
 
 
-def arguments(description: str) -> argparse.ArgumentParser:
-    """The flags that all tables have."""
+def arguments(description: str, steps: int = 1000) -> argparse.ArgumentParser:
+    """The flags that all tables have.
+
+    Args:
+        steps: of the records that are committed, so that the plain command goes on with them.
+    """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only drawn")
     parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it")
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="folder for trained runs (default: runs)")
-    parser.add_argument("--steps", type=int, default=1000, help="training steps of each run (default: 1000)")
+    parser.add_argument("--steps", type=int, default=steps, help="training steps of each run (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=20)
     parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: 0,1,2)")
     parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training begins")
