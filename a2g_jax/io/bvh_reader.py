@@ -141,7 +141,8 @@ def _find_fault(path: object, lines: list[str], first: int, channels: int) -> No
             if abs(value) > MAX_VALUE:
                 fail(path, first + at, f"value {column} is out of range; got {shown(token)}.")
         if tokens and len(tokens) != channels:
-            hint = "is the file cut short? Restore it, or remove the line and correct the header"
+            short = "is the file cut short? Restore it, or remove the line and correct the header"
+            hint = short if len(tokens) < channels else "correct the joints' channels or remove the rest"
             fail(path, first + at, f"expected {channels} values, one a channel; got {len(tokens)}; {hint}.")
     raise InputError(f"{path}: the frames cannot be read as numbers; is the file damaged?")
 
