@@ -134,7 +134,8 @@ def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str
         mean = mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
     candidates = {
         "truth": inner,
-        "another clip's motion": np.roll(inner, len(inner) // 2, axis=0),
+        # A take may have one clip alone.
+        **({"another clip's motion": np.roll(inner, len(inner) // 2, axis=0)} if len(inner) > 1 else {}),
         "first pose held": np.broadcast_to(pose[:, protocol.first - 1 : protocol.first], inner.shape),
         "mean pose": np.broadcast_to(mean[None, None], inner.shape),
     }
