@@ -1,15 +1,12 @@
 """What each subcommand of ``a2g`` does; the command line itself is in :mod:`a2g_jax.cli`."""
 
 import argparse
-import contextlib
 import dataclasses
-import os
 import textwrap
 from pathlib import Path
 from typing import Any
 
-import jax
-
+from a2g_jax.compilations import keep_compilations
 from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import NAMES, find_data_set
@@ -43,25 +40,6 @@ from a2g_jax.training.run import Run, RunConfig, demo_run, open_run
 DEMO_SPEECH: dict[str, Any] = {"seconds": 20.0, "seed": 20211011, "speaker": "chiara", "emotion": "neutral"}
 #: What ``a2g demo --train`` trains on, minutes.
 DEMO_MINUTES = 20.0
-
-
-def _cache_compilations() -> None:
-    """Keep compiled programs between runs; XLA compiles for seconds what it runs in milliseconds."""
-    if os.environ.get("JAX_COMPILATION_CACHE_DIR") is None:
-        cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
-        folder = Path(cache) / "a2g_jax" / "xla"
-        _drop_unfinished(folder)
-        jax.config.update("jax_compilation_cache_dir", str(folder))
-        jax.config.update("jax_compilation_cache_max_size", 500_000_000)
-
-
-def _drop_unfinished(folder: Path) -> None:
-    """Remove programs without the note of their last use, left by a kill between the two: with one of them in the
-    folder JAX keeps no further program."""
-    for program in folder.glob("*-cache"):
-        if not program.with_name(program.name.removesuffix("cache") + "atime").exists():
-            with contextlib.suppress(OSError):
-                program.unlink()
 
 
 def run_prepare(options: argparse.Namespace, _extra: list[str]) -> None:
@@ -246,7 +224,7 @@ def run_training(
     features: str | Path | None = None,
 ) -> Run:
     """Open the corpus and the feature network, and train."""
-    _cache_compilations()
+    keep_compilations()
     opened = Corpus.open(corpus)
     perceptual = None if features is None else load_perceptual(features, opened)
     return train(RunConfig.of(name, preset, model, training, opened, perceptual), opened, out, resume=resume)
@@ -254,7 +232,7 @@ def run_training(
 
 def run_evaluate(options: argparse.Namespace, extra: list[str]) -> None:
     """``a2g evaluate``."""
-    _cache_compilations()
+    keep_compilations()
     evaluate_command.run(options, extra)
 
 
@@ -300,7 +278,7 @@ def run_generate(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g generate``."""
     check_formats(options.formats)
     styling = styling_of(options)
-    _cache_compilations()
+    keep_compilations()
     run = _controlled(_edited(open_run(options.run), options), options)
     audio = read_audio(options.audio, run.config.mel.sample_rate)
     pins = _pins(options)
@@ -342,7 +320,7 @@ def _controlled(run: Run, options: argparse.Namespace) -> Run:
 def run_demo(options: argparse.Namespace, _extra: list[str]) -> None:
     """``a2g demo``."""
     check_formats(options.formats)
-    _cache_compilations()
+    keep_compilations()
     out = Path(options.out)
     # Bad audio should be refused before minutes of training.
     words: Any = ()

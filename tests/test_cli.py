@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.cli import main
-from a2g_jax.commands import _drop_unfinished
+from a2g_jax.compilations import drop_unfinished
 from a2g_jax.data.talker.recordings import talk
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
@@ -217,6 +217,6 @@ def test_programs_without_a_note_of_their_last_use_are_dropped(tmp_path):
     """With one of them in the folder JAX keeps no further program."""
     for name in ("whole-cache", "whole-atime", "killed-cache", "other.txt"):
         (tmp_path / name).write_bytes(b"1")
-    _drop_unfinished(tmp_path)
+    drop_unfinished(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.txt", "whole-atime", "whole-cache"]
-    _drop_unfinished(tmp_path / "not there")
+    drop_unfinished(tmp_path / "not there")

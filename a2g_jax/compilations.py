@@ -1,0 +1,30 @@
+"""Compiled programs kept between runs: XLA compiles for seconds what it runs in milliseconds."""
+
+import contextlib
+import os
+from pathlib import Path
+
+import jax
+
+_MOST_BYTES = 500_000_000
+
+
+def keep_compilations() -> None:
+    """Keep compiled programs in the user's cache folder, unless JAX is told another one."""
+    if os.environ.get("JAX_COMPILATION_CACHE_DIR") is None:
+        cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
+        folder = Path(cache) / "a2g_jax" / "xla"
+        drop_unfinished(folder)
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        jax.config.update("jax_compilation_cache_max_size", _MOST_BYTES)
+
+
+def drop_unfinished(folder: Path) -> None:
+    """Remove programs without the note of their last use, left by a kill between the two writes.
+
+    With one of them in the folder JAX keeps no further program.
+    """
+    for program in folder.glob("*-cache"):
+        if not program.with_name(program.name.removesuffix("cache") + "atime").exists():
+            with contextlib.suppress(OSError):
+                program.unlink()
