@@ -31,8 +31,8 @@ EQUAL: Mapping[str, Mapping[bool, float]] = {
     "ted": {True: 1.77, False: 1.79},
 }
 
-#: Steps of the models that are no flows, in the flow's. A step of theirs costs a fraction of the flow's, so they train for
-#: less time than the flow; the tables tell the seconds.
+#: Steps of the models that are no flows, in the flow's. A step of theirs costs a fraction of the flow's, so they train
+#: for less time than the flow; the tables tell the seconds.
 OTHERS = {"trinity": {"a2g": 1.0, "s2g": 0.5}, "ted": {"a2g": 0.5, "s2g": 0.3}}
 
 #: Clips and context of the protocols; with the flow's tiny networks otherwise.
