@@ -24,7 +24,7 @@ from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.style import HandStyle, hand_style
 from a2g_jax.training.run import Run, open_run
-from experiments.tables.records import results
+from experiments.tables.records import name_of, results
 
 PERCENTILES = (10.0, 50.0, 90.0)
 UNITS = {"height": "m", "speed": "m/s", "radius": "m"}
@@ -119,7 +119,7 @@ def main() -> None:
     for name, found in figures["controls"].items():
         print(name, f"response {found['response']:.2f}", [(row["asked"], row[name]["mean"]) for row in found["rows"]])
     folder = results("stylized_flow")
-    write_json(folder / "steering.json", {"seed": options.seed, **figures})
+    write_json(folder / "steering.json", {"corpus": name_of(corpus), "seed": options.seed, **figures})
     picture(figures, folder / "steering.png")
 
 

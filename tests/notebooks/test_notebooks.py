@@ -46,7 +46,8 @@ def test_runs(path, tmp_path):
         notebook = executed(path, folder, stacks)
     except nbclient.exceptions.CellTimeoutError as error:
         # Once in many runs a kernel no longer answered; a notebook that hangs twice is at fault itself.
-        warnings.warn(f"{path.name} hung: {error}\n{stacks.read_text()}", stacklevel=1)
+        where = stacks.read_text() if stacks.exists() else "in the first cell"
+        warnings.warn(f"{path.name} hung: {error}\n{where}", stacklevel=1)
         notebook = executed(path, folder, stacks)
     shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     pictures = [output for output in shown if "image/png" in output.get("data", {})]
