@@ -11,29 +11,29 @@ from a2g_jax.config import parse_text
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import NAMES, find_data_set
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_data_set, prepare_talker, view_poses
 from a2g_jax.data.on_demand import OnDemand
+from a2g_jax.data.prepare import prepare_data_set, prepare_talker, view_poses
 from a2g_jax.data.settings import PRESETS, Features, find_features
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import command as evaluate_command
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.generation import retarget_command
-from a2g_jax.generation.deliver import check_formats, deliver
-from a2g_jax.generation.deliver_talk import check_talk_formats, deliver_talk
-from a2g_jax.generation.pin_report import describe
-from a2g_jax.generation.pinned import Pins
-from a2g_jax.generation.styled import Styling, styling_of
-from a2g_jax.generation.talk_request import TalkRequest, corpus_request
+from a2g_jax.generation.audio2gestures.pin_report import describe
+from a2g_jax.generation.audio2gestures.pinned import Pins
+from a2g_jax.generation.export import check_formats, deliver
+from a2g_jax.generation.stylized_flow.styled import Styling, styling_of
+from a2g_jax.generation.talk.files import check_talk_formats, deliver_talk
+from a2g_jax.generation.talk.request import TalkRequest, corpus_request
 from a2g_jax.inspection import command as inspect_command
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.files import read_json
 from a2g_jax.models import find_model
+from a2g_jax.models.train_config import TRAIN_PRESETS, TrainConfig, training_preset
 from a2g_jax.progress import progress_bar
-from a2g_jax.training.config import TRAIN_PRESETS, TrainConfig, training_preset
-from a2g_jax.training.feature_run import load_perceptual
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.views.catalogue import find_view
 from a2g_jax.training.loop import train
+from a2g_jax.training.perceptual import load_perceptual
 from a2g_jax.training.run import Run, RunConfig, demo_run, open_run
 
 #: The demo's own speech: who says it, for how long, and from which seed (one that no training corpus uses).

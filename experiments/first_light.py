@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.talker.recordings import resample_motion, talk
-from a2g_jax.generation.generate import Generator
-from a2g_jax.geometry.body import find_body
+from a2g_jax.generation.engine import Generator
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.metrics.rhythm import (
@@ -29,8 +28,9 @@ from a2g_jax.metrics.rhythm import (
     speed_peaks,
     wrist_speed,
 )
-from a2g_jax.training.evaluation import validate
+from a2g_jax.talker.recordings import resample_motion, talk
 from a2g_jax.training.run import Run, demo_run, load_run
+from a2g_jax.training.validation import validate
 
 #: Seconds from a stroke's fastest moment to its syllable's energy peak, as the generated corpus has it.
 LEAD = 0.15

@@ -18,10 +18,9 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.rows import prepare_recording
+from a2g_jax.data.featurise import prepare_recording
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.recordings import cast, talk
-from a2g_jax.evaluation.candidates import with_noise
+from a2g_jax.evaluation.baselines import with_noise
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.places import Body
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
@@ -32,6 +31,7 @@ from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import atomic_path, make_folder, sha256_file, write_json
 from a2g_jax.metrics.beats import mel_onsets
 from a2g_jax.metrics.distribution import frechet_distance
+from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.training.run import WEIGHTS_FILE, load_run
 
 FPS = 30.0

@@ -13,14 +13,14 @@ import numpy as np
 from PIL import Image
 
 from a2g_jax.cli import main as run_command
-from a2g_jax.data.talker.recordings import plan_from_json
-from a2g_jax.data.talker.truth import GestureTruth
-from a2g_jax.generation.deliver_talk import right_motions
-from a2g_jax.generation.talk_request import TalkRequest
+from a2g_jax.generation.talk.files import right_motions
+from a2g_jax.generation.talk.page import busiest_moments, write_talk_page
+from a2g_jax.generation.talk.request import TalkRequest
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import atomic_path
+from a2g_jax.talker.recordings import plan_from_json
+from a2g_jax.talker.truth import GestureTruth
 from a2g_jax.viz.player import screenshot_page
-from a2g_jax.viz.talk_page import busiest_moments, write_talk_page
 
 WIDTH = 1600
 #: Heights of a row of figures, and of the timeline under the last one, pixels.

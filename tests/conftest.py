@@ -52,9 +52,9 @@ def shared() -> Path:
 def toy_corpus(tmp_path_factory):
     """Six generated recordings of ten seconds at 30 fps."""
     from a2g_jax.data.corpus import Corpus
-    from a2g_jax.data.prepare import prepare_recording, write_corpus
+    from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
     from a2g_jax.data.settings import Features
-    from a2g_jax.data.talker.recordings import talk
+    from a2g_jax.talker.recordings import talk
 
     features = Features()
     rows = (prepare_recording(talk(10.0, seed, name=f"take{seed}"), features) for seed in range(6))
@@ -80,7 +80,7 @@ def toy_run_config(toy_corpus):
     import dataclasses
 
     from a2g_jax.models import find_model
-    from a2g_jax.training.config import TRAIN_PRESETS
+    from a2g_jax.models.train_config import TRAIN_PRESETS
     from a2g_jax.training.run import RunConfig
 
     def make(**changes):

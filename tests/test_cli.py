@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from a2g_jax.cli import main
 from a2g_jax.compilations import drop_unfinished
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.talker.recordings import talk
 
 SMALL = ["--audio-channels", "8,8", "--motion-channels", "8,8", "--decoder-channels", "8,8", "--clip-frames", "16"]
 

@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.inspection.arguments import add_arguments
 from a2g_jax.inspection.command import run
@@ -17,6 +16,7 @@ from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.npz import write_motion_npz
 from a2g_jax.io.textgrid import write_words
+from a2g_jax.talker.recordings import talk
 
 
 def inspect(*arguments):

@@ -6,9 +6,9 @@ from conftest import TOY_MODEL
 
 from a2g_jax import commands
 from a2g_jax.cli import main
-from a2g_jax.data.talker import recordings
 from a2g_jax.models import find_model
-from a2g_jax.training.config import TRAIN_PRESETS
+from a2g_jax.models.train_config import TRAIN_PRESETS
+from a2g_jax.talker import recordings
 
 
 def test_demo_trains(tmp_path, monkeypatch, capsys):

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
-from a2g_jax.data.talker.recordings import plan_from_json, resample_motion, talk
-from a2g_jax.data.talker.views.upper_body import UPPER_BODY_JOINTS
-from a2g_jax.generation.talk_request import truth_from_json
+from a2g_jax.generation.talk.request import truth_from_json
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.files import read_json
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.io.textgrid import read_words
+from a2g_jax.talker.recordings import plan_from_json, resample_motion, talk
+from a2g_jax.talker.views.upper_body import UPPER_BODY_JOINTS
 
 #: What one recording of three motions consists of.
 FILES = {
@@ -134,7 +134,7 @@ def test_a_recording_of_a_corpus(tmp_path, capsys):
 def test_errors_are_one_line_and_leave_nothing(tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     if "600" in arguments:  # as long, without the computing
-        monkeypatch.setattr("a2g_jax.generation.deliver_talk._PAGE_LIMIT", 1000)
+        monkeypatch.setattr("a2g_jax.generation.talk.files._PAGE_LIMIT", 1000)
         arguments = ["--seconds", "4"]
     assert main(["talk", "--out", str(tmp_path / "out"), *arguments]) == 2
     error = capsys.readouterr().err.strip().splitlines()

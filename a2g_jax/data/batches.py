@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.features.augment import augment_log_mel
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.models.base import Batch
 
 
 class Crops(NamedTuple):

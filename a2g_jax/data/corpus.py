@@ -11,13 +11,13 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Float, Int16, Int32
 
-from a2g_jax.data.poses import PoseLayout
-from a2g_jax.data.representation import WIDTHS, rotations_from_rows
 from a2g_jax.data.splits import Segment, Splits
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import WIDTHS, rotations_from_rows
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import read_json
 
@@ -63,7 +63,7 @@ class Corpus:
     body: Skeleton | PoseLayout
     """What the rows of a pose are: joints of a skeleton, or points and bones."""
     representation: str
-    """How a pose is written down: a key of :data:`~a2g_jax.data.representation.WIDTHS`."""
+    """How a pose is written down: a key of :data:`~a2g_jax.geometry.pose_space.WIDTHS`."""
     recordings: tuple[Entry, ...]
     splits: Splits
     recipe: dict[str, Any]

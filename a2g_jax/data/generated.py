@@ -5,16 +5,16 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from a2g_jax.data.rows import Prepared, prepare_recording
+from a2g_jax.data.featurise import Prepared, prepare_recording
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
-from a2g_jax.data.talker.recordings import cast, talk
-from a2g_jax.data.talker.speakers import SPEAKERS
-from a2g_jax.data.talker.views.capture import add_jitter
-from a2g_jax.data.talker.views.catalogue import find_view
 from a2g_jax.errors import InputError
+from a2g_jax.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.talker.recordings import cast, talk
+from a2g_jax.talker.speakers import SPEAKERS
+from a2g_jax.talker.views.capture import add_jitter
+from a2g_jax.talker.views.catalogue import find_view
 
-#: Arguments of :func:`~a2g_jax.data.talker.recordings.talk` for one recording.
+#: Arguments of :func:`~a2g_jax.talker.recordings.talk` for one recording.
 Role: TypeAlias = dict[str, Any]
 
 # Beside the streams that talk() splits a recording's seed into.
@@ -29,15 +29,15 @@ class TalkerOptions:
     seed: int = 0
     fps: float = 30.0
     speakers: tuple[str, ...] = ()
-    """Some of :data:`~a2g_jax.data.talker.speakers.SPEAKERS`; empty for all."""
+    """Some of :data:`~a2g_jax.talker.speakers.SPEAKERS`; empty for all."""
     emotions: tuple[str, ...] = ()
-    """Some of :data:`~a2g_jax.data.talker.emotions.VOICE_EMOTIONS`; empty for all."""
+    """Some of :data:`~a2g_jax.talker.emotions.VOICE_EMOTIONS`; empty for all."""
     jitter: float = 0.0
-    """Degrees of capture noise: see :func:`~a2g_jax.data.talker.views.capture.add_jitter`."""
+    """Degrees of capture noise: see :func:`~a2g_jax.talker.views.capture.add_jitter`."""
     fingers: bool = False
     """The 52 joints with fingers instead of the 22 of the body."""
     view: str = "body"
-    """As which data set shows its speakers: see :data:`~a2g_jax.data.talker.views.catalogue.VIEWS`."""
+    """As which data set shows its speakers: see :data:`~a2g_jax.talker.views.catalogue.VIEWS`."""
 
     def __post_init__(self) -> None:
         find_view(self.view)

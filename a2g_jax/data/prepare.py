@@ -1,274 +1,139 @@
-"""From recordings to a corpus: rows, statistics, splits, a manifest; stopped at any moment, it can be gone on with."""
+"""Whole corpora, with progress: generated, or from the recordings of a data set."""
 
-import hashlib
-import json
 import os
-import shutil
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from a2g_jax import __version__
-from a2g_jax.data.corpus import (
-    ARRAYS,
-    FORMAT,
-    MANIFEST,
-    PARTS,
-    VERSION,
-    VERSION_ON_DEMAND,
-    WAVEFORM,
-    Corpus,
-    Entry,
-    body_to_json,
-)
-from a2g_jax.data.lock import HeldError, hold
-from a2g_jax.data.rows import Prepared as Prepared
-from a2g_jax.data.rows import Skipped as Skipped
-from a2g_jax.data.rows import prepare_recording as prepare_recording
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
+from a2g_jax.data.datasets import Take, find_data_set
+from a2g_jax.data.featurise import Prepared, Skipped, prepare_recording
+from a2g_jax.data.generated import TalkerOptions, generate_rows
+from a2g_jax.data.on_demand import OnDemand, split_roles
 from a2g_jax.data.settings import Features
-from a2g_jax.data.splits import Splits, official_splits
-from a2g_jax.data.unfinished import Unfinished
-from a2g_jax.errors import InputError, Interrupted
-from a2g_jax.features.statistics import RunningStatistics
-from a2g_jax.io.files import make_folder, read_json, sha256_file, write_json
-
-#: Standard deviations are raised to these before anything is divided by them.
-_FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
-#: Rows read at once when statistics are taken.
-_ROWS = 65536
-#: Of the layout of unfinished work; work of another one is started over.
-_LAYOUT = 2
-_RECIPE = "recipe.json"
+from a2g_jax.data.workers import in_order, worker_pool
+from a2g_jax.errors import InputError
+from a2g_jax.progress import progress_bar, say
+from a2g_jax.talker.views.catalogue import find_view
 
 
-class Item(NamedTuple):
-    """A recording that a corpus shall have."""
-
-    name: str
-    sources: tuple[str, ...]
-    """Files it is made from; empty for a generated one."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a corpus is to be."""
-
-    features: Features
-    recipe: dict[str, Any]
-    """How the recordings are made; kept in the manifest."""
-    seed: int = 0
-    """Of the split."""
-    parts: dict[str, Any] = field(default_factory=dict)
-    """Training recordings to be generated during training, as :mod:`a2g_jax.data.on_demand` knows them; or nothing."""
-    official: bool = True
-    """Whether recordings go into the parts that a data set's authors chose, where they did."""
-    skip_broken: bool = False
-    """Whether a recording that cannot be prepared is noted and left out instead of ending the work."""
-
-
-def prepare_corpus(
-    path: str | os.PathLike[str],
-    items: Sequence[Item],
-    make: Callable[[int], Generator[Prepared | Skipped, None, None]],
-    plan: Plan,
-    report: Callable[[str], None] = lambda line: None,
-) -> Corpus:
-    """Make a corpus; stopped at any moment, the same call goes on and ends with the same bytes.
-
-    The folder appears under its name only when it is complete. Until then the work lies beside it, in a hidden folder
-    ``.NAME.unfinished``. Memory holds a few recordings.
-
-    Args:
-        items: every recording, in order.
-        make: called with how many recordings are done already; gives the others in order.
-        report: called with a line for the user about anything noteworthy.
-
-    Raises:
-        InputError: the folder exists, another process prepares it, there is nothing to prepare, or recordings have
-            different joints.
-        Interrupted: by Ctrl-C.
-    """
-    path = Path(path)
-    with _place(path) as folder:
-        _start_over_unless_same(folder, path, plan, report)
-        work = Unfinished(folder, plan.features)
-        total = len(items)
-        try:
-            done, before = work.recover(list(items))
-            if before:
-                again = f" ({before - done} of those done have changed or are damaged)" if done < before else ""
-                report(f"{path}: going on after {done} of {total} recordings{again}")
-            with closing(make(done)) as rows:
-                for item in rows:
-                    _take_in(work, item, plan.skip_broken, report)
-            _finish(work, path, plan, report)
-        except KeyboardInterrupt:
-            raise Interrupted(
-                f"{path}: stopped after {work.done} of {total} recordings; the same command goes on from there."
-            ) from None
-        except Exception:
-            if work.done:
-                report(f"{path}: {work.done} of {total} recordings are done; the same command goes on from there")
-            raise
-        finally:
-            work.close()
-            if not work.done:
-                shutil.rmtree(folder, ignore_errors=True)
-    return Corpus.open(path)
-
-
-def _take_in(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
-    """Add a recording, or note why it cannot be added."""
-    if isinstance(item, Prepared):
-        try:
-            work.append(item)
-            return
-        except InputError as error:
-            if not skip:
-                raise
-            item = Skipped(item.name, item.sources, str(error))
-    report(f"skipped: {item.reason}")
-    work.skip(item)
-
-
-def write_corpus(
-    path: str | os.PathLike[str],
-    prepared: Iterable[Prepared],
+def prepare_talker(
+    out: str | os.PathLike[str],
+    options: TalkerOptions,
+    features: Features | None = None,
     *,
-    features: Features,
-    recipe: dict[str, Any],
-    seed: int = 0,
-    report: Callable[[str], None] = lambda line: None,
+    workers: int | None = None,
+    on_demand: OnDemand | None = None,
 ) -> Corpus:
-    """Write recordings to a corpus folder, one at a time and all in one go: an error leaves nothing behind.
+    """A generated corpus; the same for any number of workers.
 
     Args:
-        recipe: how the recordings were made; kept in the manifest.
-        seed: of the split.
-        report: called with a line for the user about anything noteworthy.
+        features: how audio is looked at, and how rotations are written down where the view has them; the rate and
+            other poses are those of the options.
+        workers: processes that generate; one for every core if None.
+        on_demand: store only a first part, and leave the rest of the training recordings to be generated in training.
 
     Raises:
-        InputError: the folder exists, nothing was prepared, or recordings have different joints.
+        InputError: the folder exists, or there are too few minutes.
+        Interrupted: by Ctrl-C; the same call goes on.
     """
-    path = Path(path)
-    with _place(path) as folder:
-        shutil.rmtree(folder, ignore_errors=True)
-        work = Unfinished(folder, features)
-        try:
-            work.recover([])
-            for item in prepared:
-                work.append(item)
-            _finish(work, path, Plan(features, recipe, seed), report)
-        finally:
-            work.close()
-            shutil.rmtree(folder, ignore_errors=True)
-    return Corpus.open(path)
+    features, poses = features or Features(), view_poses(options.view)
+    pose = features.pose if features.pose in poses else poses[0]
+    features = replace(features, fps=options.fps, pose=pose, joints="all")
+    roles, parts, recipe = options.roles(), {}, options.recipe()
+    if on_demand is None:
+        recipe["roles"] = roles
+    else:
+        parts = split_roles(options, roles, on_demand)
+        roles, recipe = parts["stored"], {**recipe, **on_demand.recipe()}
+    generate = partial(
+        generate_rows, jitter=options.jitter, fingers=options.fingers, view=options.view, features=features
+    )
+    items = [Item(role["name"], ()) for role in roles]
+    make = partial(_make, "generating", generate, roles, workers)
+    return prepare_corpus(out, items, make, Plan(features, recipe, options.seed, parts), say)
 
 
-def _refuse_existing(path: Path) -> None:
-    """A corpus is never written over: raise ``InputError`` if something has its name."""
-    if os.path.lexists(path):
-        raise InputError(f"{path}: exists already; choose another folder or remove it.")
+def view_poses(view: str) -> tuple[str, ...]:
+    """How the poses of a view of the talker can be written down, the usual way first."""
+    pose = find_view(view).pose
+    return ("6d", "exponential") if pose == "6d" else (pose,)
 
 
-@contextmanager
-def _place(path: Path) -> Iterator[Path]:
-    """The folder for unfinished work on a corpus, for this process alone."""
-    folder = path.parent / f".{path.name}.unfinished"
-    if not folder.exists():
-        _refuse_existing(path)
-    make_folder(path.parent)
-    try:
-        with hold(path.parent / f".{path.name}.lock"):
-            if os.path.lexists(path):
-                # The process that finished it was killed before all that it had worked with was gone.
-                shutil.rmtree(folder, ignore_errors=True)
-            _refuse_existing(path)
-            yield folder
-    except HeldError:
-        raise InputError(f"{path}: another process is preparing it; wait for it or choose another folder.") from None
+def prepare_data_set(
+    name: str,
+    source: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    features: Features,
+    *,
+    seed: int = 0,
+    official: bool = True,
+    skip_broken: bool = False,
+    limit: int | None = None,
+    workers: int | None = None,
+) -> Corpus:
+    """A corpus from recordings on disk, in any of the layouts that :mod:`a2g_jax.data.datasets` reads.
 
+    Args:
+        name: of the data set.
+        source: its folder.
+        seed: of the split, where the data set's authors made none.
+        official: keep to the authors' split.
+        skip_broken: note recordings that cannot be prepared in the manifest and leave them out.
+        limit: take only so many recordings, spread evenly over all.
+        workers: processes that prepare; one for every core if None.
 
-def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
-    """Remove unfinished work of another recipe, and write down this one."""
-    about = {**plan.features.to_json(), "package": __version__, "layout": _LAYOUT}
-    rest = {"parts": plan.parts, "official splits": plan.official, "skip broken": plan.skip_broken}
-    now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
-    if folder.is_dir():
-        try:
-            before = read_json(folder / _RECIPE)
-        except InputError:
-            before = None  # killed before a word was written, or damaged
-        if before == now:
-            return
-        if isinstance(before, dict):
-            changed = [
-                f"{key}: {before.get(key)}, now {value}"
-                for key, value in now.items()
-                if before.get(key) != value and not isinstance(value, list | dict)
-            ]
-            report(f"{path}: unfinished work with other settings ({'; '.join(changed)}) was there; starting over")
-        shutil.rmtree(folder)
-    make_folder(folder)
-    write_json(folder / _RECIPE, now)
-
-
-def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
-    """Everything but the rows; then the corpus gets its name."""
-    entries, body, folder, features = work.entries, work.body, work.corpus, plan.features
-    if body is None:
-        reason = f" the first of {work.done}: {work.skipped[0].reason}" if work.skipped else ""
-        raise InputError(f"no recordings to prepare; check the source.{reason}")
-    if work.spread > 0.001:
-        report(
-            f"bone lengths differ between recordings by up to {work.spread * 100:.1f} cm;"
-            f" rotations are kept, positions use those of {entries[0].name}"
+    Raises:
+        InputError: the folder exists, the source is not laid out so, or something is wrong with a recording.
+        Interrupted: by Ctrl-C; the same call goes on.
+    """
+    reader, folder = find_data_set(name), Path(source)
+    takes = reader.find(folder)
+    if limit is not None and limit < len(takes):
+        takes = [takes[number * len(takes) // limit] for number in range(limit)]
+    if official and takes and all(take.split in ("validation", "test") for take in takes):
+        raise InputError(
+            f"{folder}: by the authors' split all {len(takes)} recordings are for testing and validation, none for"
+            " training; add training recordings, or split by the seed with --random-split."
         )
-    work.finish_arrays()
-    parts = [entry.split if plan.official else "" for entry in entries]
-    splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
-    if not splits["train"]:
-        raise InputError(f"{path}: no recording is left for training; add some, or split by the seed (--random-split).")
-    _write_statistics(folder, entries, splits)
-    files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
-    if plan.parts:
-        write_json(folder / PARTS, plan.parts)
-        files.append(PARTS)
-    hashes = {name: sha256_file(folder / name) for name in files}
-    manifest = {
-        "format": FORMAT,
-        "version": VERSION_ON_DEMAND if plan.parts else VERSION,
-        "package": __version__,
-        "fingerprint": hashlib.sha256("".join(hashes.values()).encode()).hexdigest(),
-        "recipe": plan.recipe,
-        **features.to_json(),
-        "seconds": work.frames / features.fps,
-        **body_to_json(body),
-        "recordings": [asdict(entry) for entry in entries],
-        "splits": {name: [list(segment) for segment in segments] for name, segments in splits.items()},
-        "arrays": hashes,
-        "skipped": [asdict(item) for item in work.skipped],
-    }
-    write_json(folder / MANIFEST, manifest)
-    folder.replace(path)
-    shutil.rmtree(work.folder, ignore_errors=True)
+    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken)
+    items = [Item(take.name, take.sources) for take in takes]
+    recipe = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}
+    plan = Plan(features, recipe, seed, official=official, skip_broken=skip_broken)
+    return prepare_corpus(out, items, partial(_make, "preparing", read, takes, workers), plan, say)
 
 
-def _write_statistics(folder: Path, entries: list[Entry], splits: Splits) -> None:
-    """Means and standard deviations over the training split only."""
-    values: dict[str, Any] = {}
-    for name in ARRAYS:
-        key = name.removesuffix(".npy")
-        array = np.load(folder / name, mmap_mode="r", allow_pickle=False)
-        running = RunningStatistics()
-        for recording, start, stop in splits["train"]:
-            first = entries[recording].first
-            for row in range(first + start, first + stop, _ROWS):
-                running.add(array[row : min(row + _ROWS, first + stop)])
-        statistics = running.result(_FLOORS[key])
-        values[f"{key}_mean"], values[f"{key}_std"] = statistics.mean, statistics.std
-    np.savez(folder / "statistics.npz", **values)
+def _make(
+    what: str, work: Callable[[Any], Prepared | Skipped], inputs: Sequence[Any], workers: int | None, done: int
+) -> Generator[Prepared | Skipped, None, None]:
+    """Rows of the inputs after those that are done, in order, with progress."""
+    rest = inputs[done:]
+    # Starting a process costs as much as a few recordings.
+    count = min(os.cpu_count() or 1, len(rest) // 4) if workers is None else min(workers, len(rest))
+    with ExitStack() as stack:
+        bar = stack.enter_context(progress_bar(len(inputs), what, "recording"))
+        # What was done before does not count for the rate.
+        bar.initial = bar.n = done
+        rows: Iterable[Prepared | Skipped] = map(work, rest)
+        if count > 1:
+            pool = stack.enter_context(worker_pool(count, "the same command goes on, with fewer --workers if need be"))
+            rows = in_order(pool, work, rest, 2 * count + 2)
+        for prepared in rows:
+            yield prepared
+            bar.update()
+
+
+def _read_rows(take: Take, name: str, features: Features, skip_broken: bool) -> Prepared | Skipped:
+    try:
+        recording = find_data_set(name).read(take, features.mel.sample_rate)
+        # A corpus knows a recording by the name and the files of its take.
+        recording = replace(recording, name=take.name, sources=take.sources)
+        return prepare_recording(recording, features, take.split)
+    except InputError as error:
+        if not skip_broken:
+            raise
+        return Skipped(take.name, take.sources, str(error))

@@ -3,9 +3,9 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from a2g_jax.data.representation import WIDTHS
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.geometry.pose_space import WIDTHS
 
 JOINTS = ("body", "upper-body", "all")
 
@@ -17,7 +17,7 @@ class Features:
     fps: float = 30.0
     mel: MelConfig = field(default_factory=MelConfig)
     pose: str = "6d"
-    """A representation that :mod:`a2g_jax.data.representation` knows."""
+    """A representation that :mod:`a2g_jax.geometry.pose_space` knows."""
     joints: str = "body"
     """``"body"``: the 22 body joints; ``"upper-body"``: 47 joints with fingers; ``"all"``: the rig as it is."""
     waveform: bool = False

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
+from a2g_jax.evaluation.emotion_judge import load_emotion_judge
 from a2g_jax.evaluation.evaluate import evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.evaluation.labelled import load_emotion_judge
 from a2g_jax.evaluation.report import markdown, merge, read_report, write_report
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.run import Run, open_run

@@ -10,17 +10,17 @@ import numpy as np
 
 from a2g_jax import __version__
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.poses import PoseLayout
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation import candidates
+from a2g_jax.evaluation import baselines as candidates
 from a2g_jax.evaluation.audit import Heard, listening_audit
+from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.labelled import EmotionJudge, relevance
 from a2g_jax.evaluation.places import Body, Pose
 from a2g_jax.evaluation.report import BASELINES
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
-from a2g_jax.generation.generate import Generator
+from a2g_jax.generation.engine import Generator
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
 from a2g_jax.metrics.distribution import frechet_distance, split_floor

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.models.motion_autoencoder import encode
-from a2g_jax.training.feature_run import load_feature_run
+from a2g_jax.training.perceptual import load_feature_run
 from a2g_jax.training.run import Run
 
 #: Which residual block's features FID looks at: the fourth (Audio2Gestures, extended, Sec. 5.1).

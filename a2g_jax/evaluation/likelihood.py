@@ -22,11 +22,11 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.clips import Clips, clip_batches, clip_starts, scored_frames
 from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regression
 from a2g_jax.evaluation.evaluate import check_runs
+from a2g_jax.evaluation.likelihood_clips import Clips, clip_batches, clip_starts, scored_frames
 from a2g_jax.metrics.intervals import Interval, bootstrap_mean
-from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.training.run import Run, RunConfig
 
 #: Strengths of the ridge, of which the validation split chooses.
@@ -127,7 +127,7 @@ def fit_gaussian(config: RunConfig, corpus: Corpus, seed: int = 0, most_clips: i
 def told_rows(config: RunConfig) -> Callable[[Clips], tuple[np.ndarray, np.ndarray]]:
     """A function that gives what the scored frames of a batch are told, (n N, D), and their z-scores, (n N, C)."""
     # The global feature is left out: it is a function of the rest.
-    networks = Networks(replace(config.model_config, global_channels=0, predictor=False), config.data())
+    networks = FlowNetworks(replace(config.model_config, global_channels=0, predictor=False), config.data())
 
     @jax.jit
     def told(audio, pose, clean):

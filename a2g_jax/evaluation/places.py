@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.poses import PoseLayout
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.kinematics import joint_positions
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 

@@ -7,10 +7,11 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.evaluation.emotion_judge import EmotionJudge
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.labelled import EmotionJudge
 from a2g_jax.evaluation.places import Body, Points, Pose
-from a2g_jax.metrics import beats, distribution, diversity, physical, pointwise, semantic, structural
+from a2g_jax.features import similarity
+from a2g_jax.metrics import beats, distribution, diversity, physical, pointwise, semantic
 
 
 class Metric(NamedTuple):
@@ -120,7 +121,7 @@ class Scorer:
             [block.mean(axis=1, keepdims=True) for block in self.network.blocks(np.asarray(clip, np.float32))]
             for clip in clips
         )
-        return float(np.mean(np.asarray(structural.lpips(ours, theirs))))
+        return float(np.mean(np.asarray(similarity.lpips(ours, theirs))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,6 +155,6 @@ def _against(places, target, near, fps, scale):
         "speed_l1": scale * fps * pointwise.speed_l1(places, target),
         "acceleration_l1": fps**2 * pointwise.acceleration_l1(places, target),
         "pck": pointwise.pck(places, target, near),
-        "stft": structural.stft_distance(flat(places), flat(target)),
-        "ssim": structural.ssim(flat(places), flat(target)),
+        "stft": similarity.stft_distance(flat(places), flat(target)),
+        "ssim": similarity.ssim(flat(places), flat(target)),
     }

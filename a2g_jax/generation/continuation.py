@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.generation.generate import valid_rows
+from a2g_jax.generation.engine import valid_rows
 from a2g_jax.models.stylized_flow.model import draw_latents
-from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.nn.noise import BLOCK
 from a2g_jax.training.run import Run
 
@@ -61,7 +61,7 @@ def continue_clips(
 
 def _flow(run: Run, first: int, last: int, frames: int) -> Any:
     """Of a flow: the frames one after another, all clips and samples side by side."""
-    config, networks = run.config, Networks(run.config.model_config, run.config.data())
+    config, networks = run.config, FlowNetworks(run.config.model_config, run.config.data())
     model = config.build()
     history, lookahead = config.model_config.history_frames, config.model_config.lookahead_frames
     if first < history or last > frames - lookahead:

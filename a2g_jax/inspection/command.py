@@ -9,9 +9,9 @@ from a2g_jax.errors import InputError
 from a2g_jax.inspection.corpora import inspect_corpus
 from a2g_jax.inspection.files import Inspected, inspect_file, inspect_together
 from a2g_jax.inspection.folders import inspect_folder
+from a2g_jax.inspection.likelihood import score_file, score_report
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.runs import inspect_run
-from a2g_jax.inspection.score import score_file, score_report
 from a2g_jax.training.run import RUN_FILE
 
 
@@ -60,7 +60,7 @@ def _score(options: argparse.Namespace, audio: Path | None) -> Report:
     score = score_file(Path(options.path), Path(options.score), audio)
     if picture is not None:
         # Late, since Matplotlib is optional.
-        from a2g_jax.viz.likelihood import save_likelihood
+        from a2g_jax.inspection.likelihood_plot import save_likelihood
 
         save_likelihood(picture, score.seconds, score.log_likelihood, score.moments)
     return score_report(score, Path(options.score), curve=options.json)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage, signal
 
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 

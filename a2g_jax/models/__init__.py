@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from a2g_jax.data.representation import WIDTHS
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_space import WIDTHS
 from a2g_jax.models import audio2gestures, emotion_classifier, motion_autoencoder, speech2gesture, stylized_flow
 from a2g_jax.models.base import Data, Model
 

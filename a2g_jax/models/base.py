@@ -3,29 +3,16 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
-from a2g_jax.data.poses import PoseLayout
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 
 #: A pytree of arrays.
 Params = Any
 #: What a model keeps about its latent space after training, for sampling: a dictionary of arrays.
 Summary = dict[str, Any]
-
-
-class Batch(NamedTuple):
-    """B clips of T frames."""
-
-    audio: Float[Array, "B T bands"]
-    """Normalised audio features."""
-    pose: Float[Array, "B T R D"]
-    """Poses as the corpus writes them down, not normalised; in 6D the first two columns of each local rotation."""
-    emotion: Int[Array, " B"] | None = None
-    """Index into :attr:`Data.emotions`."""
-    speaker: Int[Array, " B"] | None = None
-    """Index into :attr:`Data.speakers`."""
 
 
 class Data(NamedTuple):
@@ -38,7 +25,7 @@ class Data(NamedTuple):
     pose_statistics: Statistics
     """Over the training split; each (R, D)."""
     representation: str = "6d"
-    """How a pose is written down: see :mod:`a2g_jax.data.representation`."""
+    """How a pose is written down: see :mod:`a2g_jax.geometry.pose_space`."""
     emotions: tuple[str, ...] = ()
     """Of the corpus, in the order of their indices."""
     speakers: tuple[str, ...] = ()
@@ -57,7 +44,7 @@ class Data(NamedTuple):
 class Model(NamedTuple):
     """A model as a record of pure functions; parameters and keys go in, arrays come out.
 
-    Networks that measure instead of generating have no ``condition`` and ``sample``; classifiers no ``reconstruct``.
+    Models that measure instead of generating have no ``condition`` and ``sample``; classifiers no ``reconstruct``.
     """
 
     name: str

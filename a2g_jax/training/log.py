@@ -8,7 +8,7 @@ from typing import Any
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.models.train_config import TrainConfig
 
 
 class MetricsLog:

@@ -19,12 +19,12 @@ from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
+from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
-from a2g_jax.training.config import TrainConfig
-from a2g_jax.training.evaluation import collect_summary, validate
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import FORMAT, RUN_FILE, WEIGHTS_FILE, Run, RunConfig, run_to_json, save_run
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
+from a2g_jax.training.validation import collect_summary, validate
 
 #: Settings that may change between parts of a run, because they do not touch what is computed in a step.
 _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})

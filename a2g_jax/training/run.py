@@ -12,16 +12,16 @@ from flax.traverse_util import flatten_dict, unflatten_dict
 from a2g_jax import __version__
 from a2g_jax.config import from_json
 from a2g_jax.data.corpus import Corpus, body_from_json, body_to_json
-from a2g_jax.data.poses import PoseLayout
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import atomic_path, read_json, sha256_file, write_json
 from a2g_jax.models import find_model
 from a2g_jax.models.base import Data, Model, Params, Summary
-from a2g_jax.training.config import TrainConfig
-from a2g_jax.training.feature_run import Perceptual, absent
+from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.perceptual import Perceptual, absent
 
 FORMAT = "a2g_jax run"
 VERSION = 1
@@ -42,7 +42,7 @@ class RunConfig:
     body: Skeleton | PoseLayout
     """What the rows of a pose are."""
     representation: str
-    """How a pose is written down: see :mod:`a2g_jax.data.representation`."""
+    """How a pose is written down: see :mod:`a2g_jax.geometry.pose_space`."""
     statistics: dict[str, Statistics]
     """``audio``, ``pose`` and ``root`` of the corpus's training split."""
     corpus: dict[str, Any]

@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Float, Int, Key
 
-from a2g_jax.models.base import Batch, Model, Params
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.data.batch import Batch
+from a2g_jax.models.base import Model, Params
+from a2g_jax.models.train_config import TrainConfig
 
 
 class TrainState(NamedTuple):

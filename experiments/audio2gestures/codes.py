@@ -24,7 +24,7 @@ from a2g_jax.evaluation.places import Body
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement, speed_peaks
-from a2g_jax.models.audio2gestures.codec import Networks
+from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.training.run import Run, demo_run, load_run
 from experiments.tables.records import results
@@ -64,7 +64,7 @@ def wrist_speeds(body: Body, pose: np.ndarray, fps: float) -> np.ndarray:
 def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     """Shares and agreements with their 95 % intervals over pairs."""
     body, fps = Body(corpus.body, corpus.representation), corpus.fps
-    networks = Networks(run.config.model_config, run.config.data())
+    networks = Codec(run.config.model_config, run.config.data())
     clips, heard = clips_of(corpus)
     speeds = [wrist_speeds(body, clip, fps) for clip in clips]
     sides = np.array([dominance(one) for one in speeds])

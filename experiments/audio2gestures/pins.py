@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.speakers import SPEAKERS
-from a2g_jax.generation.latent import LatentSpace
-from a2g_jax.generation.pin_report import FOLLOWED, corpus_jerk, report_pins
-from a2g_jax.generation.timeline import Pin, face, pin_codes
+from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
+from a2g_jax.generation.audio2gestures.pin_report import FOLLOWED, corpus_jerk, report_pins
+from a2g_jax.generation.audio2gestures.pins import Pin, face, pin_codes
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.training.run import Run, demo_run, load_run
 from experiments.tables.records import results
 

@@ -61,9 +61,9 @@ def main() -> None:
 
 def _write_corpus(options: argparse.Namespace) -> None:
     """As many test recordings as asked for, and as many to look neighbours up in."""
-    from a2g_jax.data.prepare import prepare_recording, write_corpus
+    from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
     from a2g_jax.data.settings import Features
-    from a2g_jax.data.talker.recordings import cast, talk
+    from a2g_jax.talker.recordings import cast, talk
 
     count = 10 * options.sequences  # a tenth of a corpus is its test split
     roles = [{**role, "seconds": options.frames / 30.0} for role in cast(float(count), options.seed)]

@@ -86,11 +86,11 @@ def _case(options: argparse.Namespace) -> dict[str, Any]:
     import jax
     import numpy as np
 
-    from a2g_jax.models.stylized_flow.networks import Networks
+    from a2g_jax.models.stylized_flow.networks import FlowNetworks
     from experiments.benchmarks.flow_workload import CASES, moved
 
     case = CASES[options.contender]
-    networks = Networks(case.config, case.data)
+    networks = FlowNetworks(case.config, case.data)
     params = moved(jax.jit(networks.init)(jax.random.key(options.seed)), options.seed)
     rng = np.random.default_rng(options.seed)
     audio = rng.normal(size=(options.frames, case.bands)).astype(np.float32)

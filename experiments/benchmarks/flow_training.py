@@ -70,7 +70,7 @@ def main() -> None:
 def _one(options: argparse.Namespace) -> dict[str, Any]:
     import numpy as np
 
-    from a2g_jax.training.config import training_preset
+    from a2g_jax.models.train_config import training_preset
     from experiments.benchmarks.flow_workload import CASES
 
     name, reverse, contender = options.contender.split(":")
@@ -99,7 +99,7 @@ def _one(options: argparse.Namespace) -> dict[str, Any]:
 def _ours(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: int) -> Any:
     import jax
 
-    from a2g_jax.models.base import Batch
+    from a2g_jax.data.batch import Batch
     from a2g_jax.models.stylized_flow import build
     from a2g_jax.training.state import advance, init_state
 
@@ -121,14 +121,14 @@ def _twin(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: in
     import torch
     from torch.nn import utils
 
-    from a2g_jax.models.stylized_flow.networks import Networks
+    from a2g_jax.models.stylized_flow.networks import FlowNetworks
     from experiments.benchmarks.torch_flow import Twin
     from experiments.benchmarks.torch_flow_weights import load_params
 
     torch.set_num_threads(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else measure.THREADS)
     torch.manual_seed(seed)
     twin = Twin(config, case.channels, case.bands)
-    networks = Networks(config, case.data)
+    networks = FlowNetworks(config, case.data)
     # The actnorms set from the batch, as ours are.
     params = networks.fitted(networks.init(jax.random.key(seed)), audio, networks.flat(pose))
     load_params(twin, params)

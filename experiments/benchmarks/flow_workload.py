@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from a2g_jax.data.poses import PoseLayout
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig
 

@@ -73,10 +73,10 @@ def main() -> None:
 
 def _write_sources(folder: Path, options: argparse.Namespace) -> None:
     """The same talk as BVH and WAV pairs, and as Speech2Gesture's windows."""
-    from a2g_jax.data.talker.recordings import talk
-    from a2g_jax.data.talker.views.keypoints import keypoints, write_s2g_windows
     from a2g_jax.io.audio import write_audio
     from a2g_jax.io.bvh import write_bvh
+    from a2g_jax.talker.recordings import talk
+    from a2g_jax.talker.views.keypoints import keypoints, write_s2g_windows
 
     for take in range(options.takes):
         seconds = 60.0 * options.minutes / options.takes
@@ -93,7 +93,7 @@ def _prepare(options: argparse.Namespace) -> dict[str, Any]:
     from dataclasses import replace
 
     from a2g_jax.data.datasets import find_data_set
-    from a2g_jax.data.make import prepare_data_set
+    from a2g_jax.data.prepare import prepare_data_set
     from a2g_jax.data.settings import Features
 
     reader, joints, workers = CONTENDERS[options.contender]

@@ -4,9 +4,9 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.evaluation.clips import clip_batches, clip_starts
-from a2g_jax.models.base import Batch
+from a2g_jax.evaluation.likelihood_clips import clip_batches, clip_starts
 from a2g_jax.training.run import Run
 
 

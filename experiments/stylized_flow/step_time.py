@@ -17,10 +17,10 @@ from typing import Any
 import jax
 import numpy as np
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.data.batches import draw_starts, find_crops, gather
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.io.files import write_json
-from a2g_jax.models.base import Batch
 from a2g_jax.training.state import advance, init_state
 from experiments.stylized_flow.settings import flow, moglow
 from experiments.stylized_flow.table1 import ted_arguments

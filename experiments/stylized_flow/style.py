@@ -20,16 +20,16 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.representation import represent
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.speakers import SPEAKERS
 from a2g_jax.evaluation.places import Body
-from a2g_jax.generation.flow_space import FlowSpace
-from a2g_jax.generation.style import Style
+from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
+from a2g_jax.generation.stylized_flow.style import Style
+from a2g_jax.geometry.pose_space import represent
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement_with_null
 from a2g_jax.metrics.style import HandStyle, hand_style
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.training.run import open_run
 from experiments.tables.records import results
 

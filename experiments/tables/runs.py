@@ -15,9 +15,9 @@ from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_netw
 from a2g_jax.evaluation.places import Body
 from a2g_jax.io.files import write_json
 from a2g_jax.models import find_model
-from a2g_jax.training.config import TRAIN_PRESETS
-from a2g_jax.training.feature_run import load_perceptual
+from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.training.loop import train
+from a2g_jax.training.perceptual import load_perceptual
 from a2g_jax.training.run import Run, RunConfig, load_run, run_to_json
 from experiments.tables.records import all_tables, append, name_of, records
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from a2g_jax import __version__
-from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
-from a2g_jax.data.talker.speakers import SPEAKERS
+from a2g_jax.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.talker.speakers import SPEAKERS
 
 ROOT = Path(__file__).parents[2]
 RESULTS = Path(__file__).parent / "results"

@@ -41,10 +41,10 @@ def stage(name: str, seed: int) -> Any:
     """A function that does one stage for a minute of talk."""
     from a2g_jax.data.generated import TalkerOptions, generate_rows
     from a2g_jax.data.settings import Features
-    from a2g_jax.data.talker.gestures import gesticulate
-    from a2g_jax.data.talker.plan import plan_speech
-    from a2g_jax.data.talker.voice import synthesise
     from a2g_jax.features.mel import MelConfig, log_mel
+    from a2g_jax.talker.gestures import gesticulate
+    from a2g_jax.talker.plan import plan_speech
+    from a2g_jax.talker.voice import synthesise
 
     mel, fps = MelConfig(), TalkerOptions().fps
     rng = lambda: np.random.default_rng(seed)  # noqa: E731
@@ -63,8 +63,8 @@ def stage(name: str, seed: int) -> Any:
 def corpus(name: str, minutes: float, seed: int, repeats: int) -> dict[str, Any]:
     """Seconds and bytes of whole corpora."""
     from a2g_jax.data.generated import TalkerOptions
-    from a2g_jax.data.make import prepare_talker
     from a2g_jax.data.on_demand import OnDemand
+    from a2g_jax.data.prepare import prepare_talker
 
     options = TalkerOptions(minutes=minutes, seed=seed, fingers=name == "corpus-fingers")
     demand = OnDemand(minutes / 4, minutes / 4) if name == "corpus-demand" else None

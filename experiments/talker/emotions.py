@@ -21,9 +21,9 @@ from sklearn.model_selection import StratifiedKFold, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from a2g_jax.data.talker.emotions import VOICE_EMOTIONS
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.speakers import SPEAKERS
+from a2g_jax.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.speakers import SPEAKERS
 from experiments.talker import movement, sound
 from experiments.talker.common import Part, cast_evenly, parallel, run_part, table, wilson
 

@@ -22,8 +22,8 @@ from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.speakers import SPEAKERS
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.speakers import SPEAKERS
 from experiments.talker import movement, sound
 from experiments.talker.common import Part, bootstrap, cast_evenly, parallel, run_part, table
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import interpolate, ndimage, signal
 
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 

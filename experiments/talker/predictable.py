@@ -20,7 +20,7 @@ from sklearn.model_selection import GroupKFold, cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from a2g_jax.data.talker.recordings import talk
+from a2g_jax.talker.recordings import talk
 from experiments.talker import movement, sound
 from experiments.talker.common import Part, bootstrap, cast_evenly, parallel, run_part, table
 

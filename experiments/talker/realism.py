@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from a2g_jax.data.talker.recordings import talk
+from a2g_jax.talker.recordings import talk
 from experiments.talker import movement, sound
 from experiments.talker.common import ROOT, Part, cast_evenly, parallel, run_part, table
 from experiments.talker.takes import Take, generated_take, real_takes

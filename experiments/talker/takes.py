@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.talker import body
-from a2g_jax.data.talker.body import TALKER_SKELETON
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh_reader import read_bvh
 from a2g_jax.io.textgrid import read_words
+from a2g_jax.talker import skeleton as body
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 from experiments.talker import movement
 
 

@@ -18,8 +18,8 @@ import matplotlib
 import numpy as np
 from scipy import ndimage, signal
 
-from a2g_jax.data.talker.gesture_plan import LEAD_MEAN, LEAD_RANGE, LEAD_SPREAD
-from a2g_jax.data.talker.recordings import talk
+from a2g_jax.talker.gesture_plan import LEAD_MEAN, LEAD_RANGE, LEAD_SPREAD
+from a2g_jax.talker.recordings import talk
 from experiments.talker import movement
 from experiments.talker.common import Part, cast_evenly, parallel, run_part, table
 

@@ -13,11 +13,11 @@ import pytest
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_talker
 from a2g_jax.data.on_demand import OnDemand, PartStream, split_roles
-from a2g_jax.data.talker import recordings
+from a2g_jax.data.prepare import prepare_talker
 from a2g_jax.data.workers import WorkerDiedError
 from a2g_jax.errors import InputError, Interrupted
+from a2g_jax.talker import recordings
 from a2g_jax.training import loop
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import RunConfig

@@ -7,10 +7,10 @@ import numpy as np
 
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.textgrid import write_words
+from a2g_jax.talker.recordings import talk
 
 PAGE = Path(__file__).parents[2] / "docs" / "your_data_set.md"
 

@@ -10,12 +10,12 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import NAMES, find_data_set
 from a2g_jax.data.settings import PRESETS
 from a2g_jax.data.splits import Segment, official_splits
-from a2g_jax.data.talker.recordings import talk
-from a2g_jax.data.talker.views.catalogue import VIEWS
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.io.audio import read_audio, write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.views.catalogue import VIEWS
 
 
 @pytest.fixture(scope="module")

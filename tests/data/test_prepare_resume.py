@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 
 from a2g_jax.data.corpus import ARRAYS, Corpus
+from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
+from a2g_jax.data.featurise import Prepared
 from a2g_jax.data.lock import HeldError, hold
-from a2g_jax.data.make import prepare_data_set
-from a2g_jax.data.prepare import Item, Plan, prepare_corpus
-from a2g_jax.data.rows import Prepared
+from a2g_jax.data.prepare import prepare_data_set
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.talker.recordings import talk
 
 MEL = MelConfig()
 COUNT = 8
@@ -224,10 +224,10 @@ here.prepare_corpus({path!r}, here.ITEMS, rows, here.PLAN)
 """
 
 _TALKER = """
-from a2g_jax.data.talker import recordings
+from a2g_jax.talker import recordings
 recordings.RECORDING_SECONDS = 10.0
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_talker
+from a2g_jax.data.prepare import prepare_talker
 if __name__ == "__main__":
     prepare_talker({path!r}, TalkerOptions(minutes=4.0, jitter=0.5), workers={workers})
 """

@@ -7,10 +7,10 @@ from test_prepare_resume import contents
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import TalkerOptions
-from a2g_jax.data.make import prepare_talker
-from a2g_jax.data.representation import rotations_from_rows
+from a2g_jax.data.prepare import prepare_talker
 from a2g_jax.data.settings import find_features
-from a2g_jax.data.talker import recordings
+from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.talker import recordings
 
 
 @pytest.fixture

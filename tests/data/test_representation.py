@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.poses import PoseLayout, PoseTrack, resample_track
-from a2g_jax.data.representation import represent, rotations_from_rows
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack, resample_track
+from a2g_jax.geometry.pose_space import represent, rotations_from_rows
 from a2g_jax.geometry.skeleton import Skeleton
 
 ARM = Skeleton(

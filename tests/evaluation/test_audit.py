@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from a2g_jax.data.talker.recordings import resample_motion, talk
 from a2g_jax.evaluation.audit import conditions, listening_audit
 from a2g_jax.features.mel import MelConfig, log_mel
+from a2g_jax.talker.recordings import resample_motion, talk
 
 FPS, SECONDS = 30.0, 20.0
 SPEAKERS = ["ada", "bruno", "chiara", "felix"]

@@ -8,19 +8,19 @@ import pytest
 
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.data.prepare import prepare_recording, write_corpus
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.recordings import cast, talk
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation import candidates
+from a2g_jax.evaluation import baselines as candidates
+from a2g_jax.evaluation.emotion_judge import load_emotion_judge, relevance
 from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.evaluation.labelled import load_emotion_judge, relevance
 from a2g_jax.evaluation.places import Body
 from a2g_jax.evaluation.report import check_comparable, latex, markdown, write_report
 from a2g_jax.evaluation.scores import Scorer, Target
 from a2g_jax.models import find_model
-from a2g_jax.training.config import TRAIN_PRESETS
+from a2g_jax.models.train_config import TRAIN_PRESETS
+from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import RunConfig
 

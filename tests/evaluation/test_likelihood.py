@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from a2g_jax.data.prepare import prepare_recording, write_corpus
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.clips import clip_batches, clip_starts
 from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regression
 from a2g_jax.evaluation.likelihood import bits_per_dim, fit_gaussian, gaussian_bits_per_dim, told_rows
+from a2g_jax.evaluation.likelihood_clips import clip_batches, clip_starts
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.models.stylized_flow import StylizedFlowConfig
-from a2g_jax.training.config import TRAIN_PRESETS
+from a2g_jax.models.train_config import TRAIN_PRESETS
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import Run, RunConfig
 
 MODEL = StylizedFlowConfig(

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from flax.traverse_util import flatten_dict
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import speech2gesture
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.base import Data
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_speech2gesture")

@@ -11,8 +11,8 @@ pytest.importorskip("matplotlib")
 
 from sklearn.metrics import roc_auc_score
 
-from a2g_jax.data.talker.body import FOREARM, TALKER_SKELETON, UPPER_ARM
-from a2g_jax.data.talker.paths import minimum_jerk
+from a2g_jax.talker.paths import minimum_jerk
+from a2g_jax.talker.skeleton import FOREARM, TALKER_SKELETON, UPPER_ARM
 from experiments.talker import (
     __main__ as everything,
 )

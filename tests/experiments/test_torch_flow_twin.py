@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from a2g_jax.data.poses import PoseLayout
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow import StylizedFlowConfig
-from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.nn.flow.invertible import FIXED
 from a2g_jax.nn.flow.priors import log_prob
 
@@ -32,13 +32,13 @@ CONFIGS = {
 
 
 class Setting:
-    """Networks, weights moved off their start, clips, what is hidden of them, and latents; all from fixed seeds."""
+    """FlowNetworks, weights moved off their start, clips, what is hidden of them, and latents; all from fixed seeds."""
 
     def __init__(self, config):
         self.config, rng = config, np.random.default_rng(3)
         statistics = Statistics(np.zeros((ROWS, 1), np.float32), np.ones((ROWS, 1), np.float32))
         layout = PoseLayout(tuple("abcde"), ())
-        self.networks = Networks(config, Data(layout, 20.0, BANDS, statistics, "directions"))
+        self.networks = FlowNetworks(config, Data(layout, 20.0, BANDS, statistics, "directions"))
         self.params = jax.tree_util.tree_map_with_path(partial(_moved, rng), self.networks.init(jax.random.key(5)))
         normal = lambda *size: jnp.asarray(rng.normal(size=size), jnp.float32)  # noqa: E731
         inner = config.clip_frames - config.history_frames - config.lookahead_frames

@@ -8,12 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import audio2gestures
 from a2g_jax.models.audio2gestures import objective
-from a2g_jax.models.audio2gestures.codec import Networks
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.audio2gestures.codec import Codec
+from a2g_jax.models.base import Data
 from a2g_jax.models.motion_autoencoder import MotionAutoencoderConfig, encode
 from a2g_jax.models.motion_autoencoder import build as build_autoencoder
 
@@ -49,7 +50,7 @@ EYES = MotionAutoencoderConfig(encoder_channels=(7, 6, 5, 4), decoder_channels=(
 
 
 def _setting(dtype, config=CONFIG):
-    """Networks, parameters, a batch of smooth motion and the key of a step; all from fixed seeds."""
+    """Codec, parameters, a batch of smooth motion and the key of a step; all from fixed seeds."""
     rng = np.random.default_rng(3)
     skeleton = Skeleton(rng.normal(0, 0.2, (JOINTS, 3)).astype(dtype), tuple("abcdef"), PARENTS)
     statistics = Statistics(np.zeros((JOINTS, 6), dtype), np.ones((JOINTS, 6), dtype))
@@ -61,7 +62,7 @@ def _setting(dtype, config=CONFIG):
         twins.load_params(network, eyes["encoder"])
         data = data._replace(perceptual=lambda pose, data=data: encode(EYES, data, eyes, pose))
         features = network.blocks
-    params = jax.tree.map(lambda p: jnp.asarray(p, dtype), Networks(config, data).init(jax.random.key(5)))
+    params = jax.tree.map(lambda p: jnp.asarray(p, dtype), Codec(config, data).init(jax.random.key(5)))
     # Biases start at zero; drawn ones show whether each reaches its place.
     params = jax.tree.map(lambda p: p + jnp.asarray(rng.normal(0, 0.05, p.shape), dtype), params)
     pose = np.cumsum(rng.normal(0, 0.1, (CLIPS, config.clip_frames, JOINTS, 6)), axis=1) + np.eye(3)[:2].reshape(6)
@@ -100,7 +101,7 @@ def _close(ours, theirs, tolerance):
 
 def test_networks_agree():
     data, params, batch, key, twin = _setting(np.float32)
-    networks = Networks(CONFIG, data)
+    networks = Codec(CONFIG, data)
     close = partial(_close, tolerance=1e-4)
 
     @jax.jit
@@ -178,7 +179,7 @@ def test_variants_agree(name):
 def test_encoders_agree(name):
     config = VARIANTS[name]
     data, params, batch, _, twin = _setting(np.float32, config)
-    networks = Networks(config, data)
+    networks = Codec(config, data)
     ours = jax.jit(lambda p, b: (networks.encode_audio(p, b.audio), networks.encode_motion(p, b.pose)))(params, batch)
     theirs = (
         twin._encode(twin.audio_encoder, _channels_second(batch.audio)),

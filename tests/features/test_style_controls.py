@@ -4,16 +4,16 @@ import jax
 import numpy as np
 import pytest
 
-from a2g_jax.data.poses import PoseLayout
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed, moving_mean
 from a2g_jax.geometry.mirror import mirror
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_to_6d
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow.controls import SCALES, check_controls, measure
+from a2g_jax.talker.recordings import talk
 
 FPS = 30.0
 NAMES = tuple(SCALES)

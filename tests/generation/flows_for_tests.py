@@ -7,14 +7,14 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from a2g_jax.data.representation import represent
-from a2g_jax.data.talker.recordings import talk
+from a2g_jax.data.batch import Batch
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.models.base import Batch
+from a2g_jax.geometry.pose_space import represent
 from a2g_jax.models.stylized_flow import StylizedFlowConfig, build
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import Run, RunConfig
 
 SMALL = StylizedFlowConfig(

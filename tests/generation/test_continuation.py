@@ -5,7 +5,7 @@ import pytest
 from flows_for_tests import clip, run_of
 
 from a2g_jax.generation.continuation import continue_clips
-from a2g_jax.generation.flow_space import FlowSpace
+from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 
 FIRST, LAST, FRAMES = 6, 36, 40
 

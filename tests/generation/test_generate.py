@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
-from a2g_jax.data.talker.body import TALKER_SKELETON
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.generation import generate as module
-from a2g_jax.generation.deliver import check_formats
-from a2g_jax.generation.generate import Generator
-from a2g_jax.generation.root import plant_feet
+from a2g_jax.generation import engine as module
+from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.export import check_formats
+from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_euler
 from a2g_jax.io.audio import write_audio
-from a2g_jax.training.evaluation import collect_summary
+from a2g_jax.talker.recordings import talk
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.training.run import Run
+from a2g_jax.training.validation import collect_summary
 
 _SPEECH = talk(6.0, 21).audio
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.generation.generate import Generator
-from a2g_jax.generation.latent import LatentSpace
+from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
+from a2g_jax.generation.engine import Generator
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import demo_run
 
 

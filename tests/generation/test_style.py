@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from a2g_jax.cli import main
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.generation.flow_space import FlowSpace
-from a2g_jax.generation.generate import LANES, Generator
-from a2g_jax.generation.style import Style, blend, drive, there_and_back
+from a2g_jax.generation.engine import LANES, Generator
+from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
+from a2g_jax.generation.stylized_flow.style import Style, blend, drive, there_and_back
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import demo_run, save_run
 
 

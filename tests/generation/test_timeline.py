@@ -8,14 +8,23 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
-from a2g_jax.generation.latent import LatentSpace
-from a2g_jax.generation.pin_report import report_pins
-from a2g_jax.generation.timeline import Pin, check_pins, face, parse_pin, pin_codes, pin_weights, read_pin, same_rest
+from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
+from a2g_jax.generation.audio2gestures.pin_report import report_pins
+from a2g_jax.generation.audio2gestures.pins import (
+    Pin,
+    check_pins,
+    face,
+    parse_pin,
+    pin_codes,
+    pin_weights,
+    read_pin,
+    same_rest,
+)
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import demo_run
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 from a2g_jax.io.bvh import read_bvh
 

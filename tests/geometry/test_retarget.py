@@ -22,12 +22,12 @@ from rigs_for_tests import (
 )
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.talker.body import TALKER_SKELETON
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_skeleton
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh import read_bvh
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 
 POSES = Poses.random(4, 3)
 
@@ -297,8 +297,8 @@ def test_an_invented_end_of_a_hand_points_anywhere():
 
 def test_a_rig_without_legs_is_measured_by_its_arms():
     """Height from the lowest joint to the highest would call half a body a child's, in another unit."""
-    from a2g_jax.data.talker.recordings import talk
-    from a2g_jax.data.talker.views.upper_body import upper_body
+    from a2g_jax.talker.recordings import talk
+    from a2g_jax.talker.views.upper_body import upper_body
 
     rig = find_rig(upper_body(talk(3.0, 0, fingers=True).motion))
     assert rig.unit_factor == 1.0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.body import TALKER_SKELETON
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import retarget
 from a2g_jax.inspection.files import inspect_npz
 from a2g_jax.io.bvh import read_bvh
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 
 WRISTS = [TALKER_SKELETON.index("L_Wrist"), TALKER_SKELETON.index("R_Wrist")]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.geometry.body import find_body
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.select import select_joints
 from a2g_jax.geometry.skeleton import Skeleton

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings_for_tests import RATE, clean
 
-from a2g_jax.data.talker.recordings import resample_motion
 from a2g_jax.geometry.motion import resample
 from a2g_jax.inspection.alike import audio_print, check_copies, find_copies, motion_print
+from a2g_jax.talker.recordings import resample_motion
 
 #: Recordings that are compared.
 COUNT = 5

@@ -10,11 +10,11 @@ import pytest
 from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
 
 from a2g_jax.data.corpus import MANIFEST
-from a2g_jax.data.poses import PoseLayout, PoseTrack
-from a2g_jax.data.prepare import prepare_recording, write_corpus
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack
 from a2g_jax.inspection.command import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh

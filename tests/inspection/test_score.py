@@ -8,21 +8,21 @@ import pytest
 from glitches_for_tests import GLITCHES
 
 from a2g_jax.cli import main
-from a2g_jax.data.prepare import prepare_recording, write_corpus
-from a2g_jax.data.representation import represent
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.likelihood import compiled_score
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.geometry.motion import resample
-from a2g_jax.inspection import score as score_module
-from a2g_jax.inspection.score import score_motion
+from a2g_jax.geometry.pose_space import represent
+from a2g_jax.inspection import likelihood as score_module
+from a2g_jax.inspection.likelihood import score_motion
 from a2g_jax.inspection.unlikely import acceleration_changes, unlikely_moments
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.models.stylized_flow import StylizedFlowConfig
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.talker.recordings import talk
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import RunConfig, load_run
 

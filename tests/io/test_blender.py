@@ -7,8 +7,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.recordings import talk
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.talker.recordings import talk
 
 _SCRIPT = """
 import bpy, builtins, json

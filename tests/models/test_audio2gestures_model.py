@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
@@ -16,7 +17,7 @@ from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.audio2gestures import PRESETS, build
 from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.audio2gestures.objective import weights as loss_weights
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.base import Data
 
 CONFIG = replace(
     PRESETS["tiny"],

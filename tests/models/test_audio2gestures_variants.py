@@ -9,15 +9,16 @@ import pytest
 from jax.test_util import check_grads
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.rotation import matrix_to_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures import PRESETS, build
-from a2g_jax.models.audio2gestures.codec import Networks
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.audio2gestures.codec import Codec
+from a2g_jax.models.base import Data
 
 BANDS, JOINTS, FRAMES = 5, 4, 32
 RNG = np.random.default_rng(0)
@@ -104,11 +105,11 @@ def test_every_parameter_learns(name):
 def test_exponential_maps_are_the_rotations_they_stand_for():
     """The losses on poses see the same body whichever way its rotations are written down."""
     pose = jnp.asarray(np.random.default_rng(4).normal(scale=0.5, size=(2, FRAMES, JOINTS, 3)), jnp.float32)
-    networks = Networks(BASE, EXPONENTIAL)
+    networks = Codec(BASE, EXPONENTIAL)
     rotations, places = networks.places(pose)
     expected = Rotation.from_rotvec(np.asarray(pose).reshape(-1, 3)).as_matrix().reshape(*pose.shape, 3)
     np.testing.assert_allclose(rotations, expected, atol=1e-5)
-    same = Networks(BASE, DATA).places(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
+    same = Codec(BASE, DATA).places(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
     np.testing.assert_allclose(places, same[1], atol=1e-5)
     np.testing.assert_array_equal(networks.valid(pose, rotations), pose)
 
@@ -145,7 +146,7 @@ def test_a_gru_forgets_within_its_context():
 
 def test_the_shared_code_of_the_dct_space_is_certain_and_the_specific_one_has_a_spread_for_each_band():
     config = replace(BASE, latent="dct")
-    networks = Networks(config, DATA)
+    networks = Codec(config, DATA)
     params = params_of(build(config, DATA))
     shared, specific = networks.encode_motion(params, batch(DATA, 2 * FRAMES).pose)
     np.testing.assert_array_equal(shared.sample(jax.random.key(0)), shared.mean)

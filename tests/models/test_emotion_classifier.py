@@ -6,10 +6,11 @@ import numpy as np
 import optax
 import pytest
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.models.base import Data
 from a2g_jax.models.emotion_classifier import EmotionClassifierConfig, build, classify
 
 LAYOUT = PoseLayout(("a", "b"), ((0, 1),))

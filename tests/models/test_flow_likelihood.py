@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow import StylizedFlowConfig, build
-from a2g_jax.models.stylized_flow.networks import Networks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.nn.flow.invertible import FIXED
-from a2g_jax.training.config import TrainConfig
 from a2g_jax.training.state import advance, init_state
 
 SMALL = StylizedFlowConfig(
@@ -63,7 +64,7 @@ def far_from_its_start(model):
 
 @pytest.mark.parametrize("config", [SMALL, MOGLOW], ids=["stylized flow", "moglow"])
 def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config):
-    model, networks, batch = build(config, DATA), Networks(config, DATA), batch_of()
+    model, networks, batch = build(config, DATA), FlowNetworks(config, DATA), batch_of()
     params = far_from_its_start(model)
     flat = networks.flat(batch.pose)
     first, stop = config.history_frames, 8 - config.lookahead_frames
@@ -104,7 +105,7 @@ def test_without_noise_the_score_is_what_training_lowers():
 
 def test_sixteen_steps_invert_after_training():
     config = replace(SMALL, flow_steps=16, hidden=8, frame_dropout=0.4, clip_frames=24, global_channels=0)
-    model, networks = build(config, DATA), Networks(config, DATA)
+    model, networks = build(config, DATA), FlowNetworks(config, DATA)
     settings = TrainConfig(steps=80, learning_rate=5e-3, clip_value=5.0, clip_norm=100.0)
     state = init_state(model, settings)
     step = jax.jit(lambda state, batch, key: advance(model, settings, state, batch, key))

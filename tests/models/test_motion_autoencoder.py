@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.base import Data
 from a2g_jax.models.motion_autoencoder import PRESETS, MotionAutoencoderConfig, build, encode
 
 SMALL = MotionAutoencoderConfig(encoder_channels=(8, 8, 8, 16, 4), decoder_channels=(4, 8), clip_frames=16)

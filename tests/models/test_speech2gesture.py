@@ -8,14 +8,15 @@ import numpy as np
 import optax
 import pytest
 
-from a2g_jax.data.poses import PoseLayout
-from a2g_jax.data.representation import WIDTHS
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import WIDTHS
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import find_model
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.base import Data
 from a2g_jax.models.speech2gesture import PRESETS, build
 from a2g_jax.models.speech2gesture.networks import generator_halo
 

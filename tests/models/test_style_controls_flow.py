@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
 from a2g_jax.models.stylized_flow.controls import asked, measure, parse_curves, scaled
-from a2g_jax.models.stylized_flow.networks import Networks
-from a2g_jax.training.config import TrainConfig, training_preset
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.train_config import TrainConfig, training_preset
 from a2g_jax.training.state import advance, init_state
 
 CONFIG = StylizedFlowConfig(
@@ -86,7 +87,7 @@ def test_what_is_asked_for_is_what_the_hands_do(trained):
 
 
 def test_controls_are_told_of_the_frame_itself_and_never_hidden():
-    networks = Networks(replace(CONFIG, style_controls=("height", "speed")), DATA)
+    networks = FlowNetworks(replace(CONFIG, style_controls=("height", "speed")), DATA)
     batch = batch_of(clips=2)
     hidden = jnp.zeros((2, 17, 2), bool)
     tell = jax.jit(networks.told)
@@ -103,7 +104,7 @@ def test_controls_are_told_of_the_frame_itself_and_never_hidden():
 
 def test_the_share_of_controls_is_that_of_training(trained):
     """Controls added to what was heard give the motion of latents that training would."""
-    networks, params = Networks(CONFIG, DATA), trained[0]
+    networks, params = FlowNetworks(CONFIG, DATA), trained[0]
     batch = batch_of(clips=1, frames=64, seed=3)
     z = jax.random.normal(jax.random.key(2), (64, 15))
     controls = jnp.linspace(-0.2, 0.6, 64)[:, None]

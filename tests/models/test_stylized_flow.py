@@ -7,14 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from a2g_jax.data.poses import PoseLayout
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.models.base import Batch, Data
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
 from a2g_jax.models.stylized_flow.model import draw_latents
-from a2g_jax.models.stylized_flow.networks import Networks
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.state import advance, init_state, learning_rate
 
 SMALL = StylizedFlowConfig(
@@ -67,7 +68,7 @@ def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
     model, state, history = trained(config)
     assert bool(state.good)
     assert np.mean(history[-5:]) < np.mean(history[:5]) - 0.1
-    networks = Networks(config, DATA)
+    networks = FlowNetworks(config, DATA)
     audio = batch_of(clips=1, frames=128).audio[0]
     key = jax.random.key(7)
     heard = jax.jit(model.condition)(state.params, audio)
@@ -107,9 +108,9 @@ def test_poses_beyond_those_of_training_are_drawn_back_and_no_others_are():
 
     def within(low, high):
         bounds = {"pose_low": jnp.full((2, 6), low), "pose_high": jnp.full((2, 6), high)}
-        return Networks(MOGLOW, DATA).flat(sample(params, bounds, key, heard, jnp.int32(0))[None])[0]
+        return FlowNetworks(MOGLOW, DATA).flat(sample(params, bounds, key, heard, jnp.int32(0))[None])[0]
 
-    flat = Networks(MOGLOW, DATA).flat(free[None])[0]
+    flat = FlowNetworks(MOGLOW, DATA).flat(free[None])[0]
     np.testing.assert_array_equal(within(-1e3, 1e3), flat)
     # The latents of an untrained flow are nearly its poses: what lies beyond 0.5 lies half as far beyond it.
     kept, beyond = within(-0.5, 0.5), np.abs(np.asarray(flat)) > 0.5
@@ -121,7 +122,7 @@ def test_the_summary_has_the_range_of_every_clip():
     model, batch = build(MOGLOW, DATA), batch_of()
     params = jax.jit(model.init)(jax.random.key(0))
     summary = jax.jit(model.summarise)(params, jax.random.key(0), batch)
-    flat = Networks(MOGLOW, DATA).flat(batch.pose)
+    flat = FlowNetworks(MOGLOW, DATA).flat(batch.pose)
     np.testing.assert_allclose(summary["pose_low"], flat.min(axis=1), rtol=1e-6)
     np.testing.assert_allclose(summary["pose_high"], flat.max(axis=1), rtol=1e-6)
 
@@ -140,7 +141,7 @@ def test_the_first_step_fits_the_actnorms_and_no_other_does():
 
 def test_told_poses_are_those_before_and_audio_those_around():
     config = replace(SMALL, global_channels=0)
-    networks = Networks(config, DATA)
+    networks = FlowNetworks(config, DATA)
     audio, flat = jnp.arange(24.0)[None, :, None] * jnp.ones((1, 1, 4)), jnp.arange(24.0)[None, :, None]
     told = networks.told({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
     assert told.history.shape == (1, 19, 18)

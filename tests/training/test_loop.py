@@ -16,7 +16,8 @@ import pytest
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.rotation import matrix_from_6d
-from a2g_jax.training import evaluation, loop
+from a2g_jax.training import loop
+from a2g_jax.training import validation as evaluation
 from a2g_jax.training.loop import Interrupted, TrainingError, train
 from a2g_jax.training.run import load_run, save_run
 
@@ -183,7 +184,7 @@ from pathlib import Path
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.config import from_json
 from a2g_jax.models import find_model
-from a2g_jax.training.config import TrainConfig
+from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import RunConfig
 import json

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON, TALKER_SKELETON
-from a2g_jax.data.talker.views.upper_body import upper_body_skeleton
 from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
+from a2g_jax.talker.views.upper_body import upper_body_skeleton
 from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.hands import find_fingers
 from a2g_jax.viz.player.roles import find_roles, rest_positions

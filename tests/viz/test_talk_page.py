@@ -3,11 +3,11 @@ import re
 import numpy as np
 import pytest
 
-from a2g_jax.data.talker.recordings import plan_from_json, resample_motion, talk
-from a2g_jax.generation.deliver_talk import right_motions
+from a2g_jax.generation.talk.files import right_motions
+from a2g_jax.generation.talk.page import busiest_moments, gesture_lane, write_talk_page
+from a2g_jax.talker.recordings import plan_from_json, resample_motion, talk
 from a2g_jax.viz.pitch import pitch_curve
 from a2g_jax.viz.player import Bars, Curve, Figure, Hands, Mark, write_page
-from a2g_jax.viz.talk_page import busiest_moments, gesture_lane, write_talk_page
 from tests.viz.figures_for_tests import tone, waving
 from tests.viz.test_player_browser import browser as browser  # the fixture
 from tests.viz.test_player_browser import opened, wait_until

@@ -2,14 +2,14 @@
 
 TED Gesture and TED-Expressive: the pairs and the lengths that their authors' code draws poses with (``dir_vec_pairs``
 in ``data_utils.py`` of Yoon et al. 2020 and in ``data_utils_expressive.py`` of Liu et al. 2022), as
-:mod:`~a2g_jax.data.talker.views.directions` has them. Speech2Gesture and PATS: the order of ``joint_names`` in PATS'
+:mod:`~a2g_jax.talker.views.directions` has them. Speech2Gesture and PATS: the order of ``joint_names`` in PATS'
 ``skeleton.py``, which is that of ``consts.py`` of Ginosar et al. 2019 (there, 7 to 27 are the left hand and 28 to 48
 the right one once nose and eyes are gone).
 """
 
-from a2g_jax.data.poses import PoseLayout
-from a2g_jax.data.talker.views.directions import TED, TED_EXPRESSIVE, BoneLayout
-from a2g_jax.data.talker.views.keypoints import KEYPOINTS
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.talker.views.directions import TED, TED_EXPRESSIVE, BoneLayout
+from a2g_jax.talker.views.keypoints import KEYPOINTS
 
 
 def _directions(layout: BoneLayout) -> PoseLayout:

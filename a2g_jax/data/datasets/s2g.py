@@ -36,9 +36,9 @@ from a2g_jax.data.datasets.layouts import S2G_LAYOUT
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, table_rows, unique_names
 from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.poses import PoseTrack
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_layout import PoseTrack
 from a2g_jax.io.untrusted import Limits, read_npz
 
 FPS = 15.0

@@ -2,7 +2,7 @@
 
 SMPL-X (Pavlakos et al. 2019, "Expressive Body Capture") may not be shipped, so its joints at rest, which depend on the
 shape ``betas``, are not known here: bones are those of the talker's average adult
-(:data:`~a2g_jax.data.talker.body.TALKER_HANDS_SKELETON`), which has SMPL-X's joints, order, tree and T-pose. Rotations
+(:data:`~a2g_jax.talker.skeleton.TALKER_HANDS_SKELETON`), which has SMPL-X's joints, order, tree and T-pose. Rotations
 are therefore exact and positions approximate; ``betas`` are ignored.
 """
 
@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON, TALKER_SKELETON
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
 
 #: Joints of the body, of jaw and eyes, and of both hands.
 BODY, FACE, HANDS = slice(0, 22), slice(22, 25), slice(25, 55)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body import path_up
+from a2g_jax.geometry.body_joints import path_up
 from a2g_jax.geometry.joint_names import parse_name
 from a2g_jax.geometry.retarget.poses import angle_between, joint_places
 from a2g_jax.geometry.retarget.rest import ankle_height

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body import path_up
+from a2g_jax.geometry.body_joints import path_up
 from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_places, world_rotations

@@ -18,7 +18,7 @@ from a2g_jax.models.base import Data, Params
 
 
 @dataclass(frozen=True, eq=False)
-class Networks:
+class Codec:
     """The four networks with the pose representation between them and the body.
 
     Codes are in time, or in the DCT bands of consecutive blocks where the latent space is that of the DCT; decoding

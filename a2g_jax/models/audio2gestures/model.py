@@ -4,12 +4,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
-from a2g_jax.models.audio2gestures.codec import Networks as Networks
+from a2g_jax.data.batch import Batch
+from a2g_jax.models.audio2gestures.codec import Codec as Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.networks import MAPPING_LAYERS, Gaussian
 from a2g_jax.models.audio2gestures.objective import check_objective, terms, total, weights
-from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.nn.noise import blended_draws, frame_normal, slow_normal
 from a2g_jax.nn.tcn import receptive_halo
 
@@ -25,7 +26,7 @@ def build(config: Audio2GesturesConfig, data: Data) -> Model:
     Raises:
         InputError: a loss needs what the corpus or the command did not give.
     """
-    networks = Networks(config, data)
+    networks = Codec(config, data)
     check_objective(networks)
     weighted = weights(config)
 
@@ -75,7 +76,7 @@ def build(config: Audio2GesturesConfig, data: Data) -> Model:
 
 
 def draw_codes(
-    networks: Networks,
+    networks: Codec,
     params: Params,
     summary: Summary,
     key: Key[Array, ""],

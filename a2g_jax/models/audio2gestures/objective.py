@@ -7,17 +7,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.similarity import lpips, ssim, stft_distance
 from a2g_jax.models.audio2gestures import losses
-from a2g_jax.models.audio2gestures.codec import Networks
+from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
-from a2g_jax.models.base import Batch, Params
+from a2g_jax.models.base import Params
 
 Terms = dict[str, Array]
 
 
-def check_objective(networks: Networks) -> None:
+def check_objective(networks: Codec) -> None:
     """Refuse settings that this corpus or feature network cannot serve.
 
     Raises:
@@ -76,12 +77,12 @@ def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"]) -> Float[Array,
     return mean + std * jax.random.normal(key, code.shape, code.dtype)
 
 
-def terms(networks: Networks, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+def terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     """Every loss of one batch, unweighted, and figures that show degeneration early."""
     return (_split_terms if networks.config.split else _joint_terms)(networks, params, key, batch)
 
 
-def _split_terms(networks: Networks, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+def _split_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     config = networks.config
     keys = jax.random.split(key, 10)
     drop = list(keys[6:]) if config.dropout > 0 else [None] * 4
@@ -137,7 +138,7 @@ def _split_terms(networks: Networks, params: Params, key: Key[Array, ""], batch:
     }
 
 
-def _joint_terms(networks: Networks, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+def _joint_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     """Without a motion-specific code: reconstruction and alignment alone (Table 2, baseline)."""
     config = networks.config
     keys = jax.random.split(key, 5)
@@ -164,7 +165,7 @@ def _shared_kl(config: Audio2GesturesConfig, audio: Any, motion: Any) -> Terms:
 
 
 def _motion_terms(
-    networks: Networks,
+    networks: Codec,
     truth: Float[Array, "B T R D"],
     pose: Float[Array, "B2 T R D"],
     turns: list[Array] | None,

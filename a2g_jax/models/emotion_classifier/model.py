@@ -9,8 +9,9 @@ import optax
 from flax import linen as nn
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
-from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
 from a2g_jax.nn.tcn import TCN, receptive_halo
 

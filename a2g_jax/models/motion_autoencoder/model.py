@@ -8,10 +8,11 @@ import jax.numpy as jnp
 from flax import linen as nn
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
 from a2g_jax.models.audio2gestures import losses
-from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig
 from a2g_jax.nn.conv import Dense
 from a2g_jax.nn.tcn import TCN, ResidualBlock, receptive_halo

@@ -6,12 +6,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
 from a2g_jax.models.audio2gestures import losses
-from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.speech2gesture.config import Speech2GestureConfig
-from a2g_jax.models.speech2gesture.networks import Discriminator, Generator, generator_halo
+from a2g_jax.models.speech2gesture.networks import Discriminator, Translator, generator_halo
 
 
 def build(config: Speech2GestureConfig, data: Data) -> Model:
@@ -21,7 +22,7 @@ def build(config: Speech2GestureConfig, data: Data) -> Model:
     """
     rows = data.pose_statistics.mean.shape
     width = rows[0] * rows[1]
-    generator = Generator(config, width)
+    generator = Translator(config, width)
     discriminator = Discriminator(config.discriminator_channels, config.normalise)
     turns = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle}.get(data.representation)
     adversarial = config.adversarial_weight > 0

@@ -84,7 +84,7 @@ class UNet(nn.Module):
         return x
 
 
-class Generator(nn.Module):
+class Translator(nn.Module):
     """Audio to the values of a pose, as z-scores."""
 
     config: Speech2GestureConfig

@@ -136,5 +136,5 @@ PRESETS: dict[str, StylizedFlowConfig] = {
 for StyleGestures, apart from our ``input_noise``, which theirs lacks (``--input-noise 0``). ``moglow_styled``: the same
 with style controls, all in one model, and the height that of both hands; StyleGestures trains one model for each
 control, and its height is that of the right hand (``--style-controls right_height``). How each is trained:
-:data:`a2g_jax.training.config.MODEL_PRESETS`.
+:data:`a2g_jax.models.train_config.MODEL_PRESETS`.
 """

@@ -16,12 +16,12 @@ from collections.abc import Callable
 from jaxtyping import Array, Float
 
 from a2g_jax.models.base import Params
-from a2g_jax.models.stylized_flow.networks import Networks, Told
+from a2g_jax.models.stylized_flow.networks import FlowNetworks, Told
 from a2g_jax.nn.flow.priors import log_prob
 
 
 def log_likelihood(
-    networks: Networks, params: Params, flat: Float[Array, "B T C"], told: Told
+    networks: FlowNetworks, params: Params, flat: Float[Array, "B T C"], told: Told
 ) -> tuple[Float[Array, "B N"], Float[Array, "B N C"]]:
     """Log-density of each frame in nats, and the latents.
 
@@ -33,7 +33,7 @@ def log_likelihood(
     return log_prob(z, networks.config.freedom) + log_det, z
 
 
-def make_score(networks: Networks) -> Callable[..., Array]:
+def make_score(networks: FlowNetworks) -> Callable[..., Array]:
     """The model's answer to ``score``: see :class:`a2g_jax.models.base.Model`."""
 
     def score(

@@ -7,14 +7,15 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
+from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
-from a2g_jax.models.base import Batch, Data, Model, Params, Summary
+from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import hidden
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import asked, check_controls, parse_curves
 from a2g_jax.models.stylized_flow.likelihood import log_likelihood, make_score
-from a2g_jax.models.stylized_flow.networks import Carried, Heard, Networks, Told
+from a2g_jax.models.stylized_flow.networks import Carried, FlowNetworks, Heard, Told
 from a2g_jax.nn.flow.priors import spread
 from a2g_jax.nn.noise import frame_normal
 
@@ -28,7 +29,7 @@ def build(config: StylizedFlowConfig, data: Data) -> Model:
     check_controls(config.style_controls, data)
     if config.perceptual_weight > 0 and config.reverse_share > 0 and data.perceptual is None:
         raise InputError("--perceptual-weight: needs a feature network; add --features RUN, or set it to 0.")
-    networks = Networks(config, data)
+    networks = FlowNetworks(config, data)
     curves = parse_curves(config.control_curves, config.style_controls)
     likelihood, reverse = _likelihood(networks), _reverse(networks)
 
@@ -160,7 +161,7 @@ def draw_latents(
     return config.temperature * jax.vmap(one)(start + jnp.arange(frames), normal)
 
 
-def _likelihood(networks: Networks) -> Any:
+def _likelihood(networks: FlowNetworks) -> Any:
     """Bits per frame of the frames of clips."""
 
     def bits(params: Params, flat: Float[Array, "B T C"], told: Told) -> tuple[Float[Array, ""], dict[str, Array]]:
@@ -171,7 +172,7 @@ def _likelihood(networks: Networks) -> Any:
     return bits
 
 
-def _reverse(networks: Networks) -> Any:
+def _reverse(networks: FlowNetworks) -> Any:
     """Distances from the truth of what random latents become after the true poses (Sec. 3.2 and 3.3)."""
     config, data = networks.config, networks.data
 

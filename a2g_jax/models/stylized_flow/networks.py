@@ -78,7 +78,7 @@ class Limits(NamedTuple):
         return x - 0.5 * (x - jnp.clip(x, self.low[None], self.high[None]))
 
 
-class Networks:
+class FlowNetworks:
     """Pure functions of parameters; poses here are z-scores, flattened to C values."""
 
     def __init__(self, config: StylizedFlowConfig, data: Data) -> None:

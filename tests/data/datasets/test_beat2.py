@@ -6,11 +6,11 @@ from datasets_beat2_tree import WORDS, made_up_speech, write_beat2
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.datasets.beat2 import DATASET
-from a2g_jax.data.talker.body import TALKER_HANDS_SKELETON, TALKER_SKELETON
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import find_rig, match_rigs, retarget
 from a2g_jax.io.bvh import read_bvh
+from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
 
 SPLIT = [
     ("2_scott_0_1_1", "train"),

@@ -8,8 +8,8 @@ from datasets_s2g_tree import made_up_interval, write_interval, write_table
 
 from a2g_jax.data.datasets.layouts import S2G_LAYOUT
 from a2g_jax.data.datasets.s2g import DATASET
-from a2g_jax.data.talker.views.keypoints import write_s2g_windows
 from a2g_jax.errors import InputError
+from a2g_jax.talker.views.keypoints import write_s2g_windows
 
 
 def relative(poses):

@@ -9,8 +9,8 @@ from datasets_show_tree import made_up_fit, write_take
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.data.datasets.show import DATASET
-from a2g_jax.data.talker.body import PELVIS_HEIGHT, TALKER_SKELETON
 from a2g_jax.errors import InputError
+from a2g_jax.talker.skeleton import PELVIS_HEIGHT, TALKER_SKELETON
 
 #: Half a turn about x: the camera's y down and z away to y up and z toward it.
 OVER = np.diag([1.0, -1.0, -1.0])

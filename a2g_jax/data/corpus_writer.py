@@ -1,0 +1,274 @@
+"""From recordings to a corpus: rows, statistics, splits, a manifest; stopped at any moment, it can be gone on with."""
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from a2g_jax import __version__
+from a2g_jax.data.corpus import (
+    ARRAYS,
+    FORMAT,
+    MANIFEST,
+    PARTS,
+    VERSION,
+    VERSION_ON_DEMAND,
+    WAVEFORM,
+    Corpus,
+    Entry,
+    body_to_json,
+)
+from a2g_jax.data.featurise import Prepared as Prepared
+from a2g_jax.data.featurise import Skipped as Skipped
+from a2g_jax.data.featurise import prepare_recording as prepare_recording
+from a2g_jax.data.journal import Unfinished
+from a2g_jax.data.lock import HeldError, hold
+from a2g_jax.data.settings import Features
+from a2g_jax.data.splits import Splits, official_splits
+from a2g_jax.errors import InputError, Interrupted
+from a2g_jax.features.statistics import RunningStatistics
+from a2g_jax.io.files import make_folder, read_json, sha256_file, write_json
+
+#: Standard deviations are raised to these before anything is divided by them.
+_FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
+#: Rows read at once when statistics are taken.
+_ROWS = 65536
+#: Of the layout of unfinished work; work of another one is started over.
+_LAYOUT = 2
+_RECIPE = "recipe.json"
+
+
+class Item(NamedTuple):
+    """A recording that a corpus shall have."""
+
+    name: str
+    sources: tuple[str, ...]
+    """Files it is made from; empty for a generated one."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a corpus is to be."""
+
+    features: Features
+    recipe: dict[str, Any]
+    """How the recordings are made; kept in the manifest."""
+    seed: int = 0
+    """Of the split."""
+    parts: dict[str, Any] = field(default_factory=dict)
+    """Training recordings to be generated during training, as :mod:`a2g_jax.data.on_demand` knows them; or nothing."""
+    official: bool = True
+    """Whether recordings go into the parts that a data set's authors chose, where they did."""
+    skip_broken: bool = False
+    """Whether a recording that cannot be prepared is noted and left out instead of ending the work."""
+
+
+def prepare_corpus(
+    path: str | os.PathLike[str],
+    items: Sequence[Item],
+    make: Callable[[int], Generator[Prepared | Skipped, None, None]],
+    plan: Plan,
+    report: Callable[[str], None] = lambda line: None,
+) -> Corpus:
+    """Make a corpus; stopped at any moment, the same call goes on and ends with the same bytes.
+
+    The folder appears under its name only when it is complete. Until then the work lies beside it, in a hidden folder
+    ``.NAME.unfinished``. Memory holds a few recordings.
+
+    Args:
+        items: every recording, in order.
+        make: called with how many recordings are done already; gives the others in order.
+        report: called with a line for the user about anything noteworthy.
+
+    Raises:
+        InputError: the folder exists, another process prepares it, there is nothing to prepare, or recordings have
+            different joints.
+        Interrupted: by Ctrl-C.
+    """
+    path = Path(path)
+    with _place(path) as folder:
+        _start_over_unless_same(folder, path, plan, report)
+        work = Unfinished(folder, plan.features)
+        total = len(items)
+        try:
+            done, before = work.recover(list(items))
+            if before:
+                again = f" ({before - done} of those done have changed or are damaged)" if done < before else ""
+                report(f"{path}: going on after {done} of {total} recordings{again}")
+            with closing(make(done)) as rows:
+                for item in rows:
+                    _take_in(work, item, plan.skip_broken, report)
+            _finish(work, path, plan, report)
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"{path}: stopped after {work.done} of {total} recordings; the same command goes on from there."
+            ) from None
+        except Exception:
+            if work.done:
+                report(f"{path}: {work.done} of {total} recordings are done; the same command goes on from there")
+            raise
+        finally:
+            work.close()
+            if not work.done:
+                shutil.rmtree(folder, ignore_errors=True)
+    return Corpus.open(path)
+
+
+def _take_in(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
+    """Add a recording, or note why it cannot be added."""
+    if isinstance(item, Prepared):
+        try:
+            work.append(item)
+            return
+        except InputError as error:
+            if not skip:
+                raise
+            item = Skipped(item.name, item.sources, str(error))
+    report(f"skipped: {item.reason}")
+    work.skip(item)
+
+
+def write_corpus(
+    path: str | os.PathLike[str],
+    prepared: Iterable[Prepared],
+    *,
+    features: Features,
+    recipe: dict[str, Any],
+    seed: int = 0,
+    report: Callable[[str], None] = lambda line: None,
+) -> Corpus:
+    """Write recordings to a corpus folder, one at a time and all in one go: an error leaves nothing behind.
+
+    Args:
+        recipe: how the recordings were made; kept in the manifest.
+        seed: of the split.
+        report: called with a line for the user about anything noteworthy.
+
+    Raises:
+        InputError: the folder exists, nothing was prepared, or recordings have different joints.
+    """
+    path = Path(path)
+    with _place(path) as folder:
+        shutil.rmtree(folder, ignore_errors=True)
+        work = Unfinished(folder, features)
+        try:
+            work.recover([])
+            for item in prepared:
+                work.append(item)
+            _finish(work, path, Plan(features, recipe, seed), report)
+        finally:
+            work.close()
+            shutil.rmtree(folder, ignore_errors=True)
+    return Corpus.open(path)
+
+
+def _refuse_existing(path: Path) -> None:
+    """A corpus is never written over: raise ``InputError`` if something has its name."""
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists already; choose another folder or remove it.")
+
+
+@contextmanager
+def _place(path: Path) -> Iterator[Path]:
+    """The folder for unfinished work on a corpus, for this process alone."""
+    folder = path.parent / f".{path.name}.unfinished"
+    if not folder.exists():
+        _refuse_existing(path)
+    make_folder(path.parent)
+    try:
+        with hold(path.parent / f".{path.name}.lock"):
+            if os.path.lexists(path):
+                # The process that finished it was killed before all that it had worked with was gone.
+                shutil.rmtree(folder, ignore_errors=True)
+            _refuse_existing(path)
+            yield folder
+    except HeldError:
+        raise InputError(f"{path}: another process is preparing it; wait for it or choose another folder.") from None
+
+
+def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
+    """Remove unfinished work of another recipe, and write down this one."""
+    about = {**plan.features.to_json(), "package": __version__, "layout": _LAYOUT}
+    rest = {"parts": plan.parts, "official splits": plan.official, "skip broken": plan.skip_broken}
+    now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
+    if folder.is_dir():
+        try:
+            before = read_json(folder / _RECIPE)
+        except InputError:
+            before = None  # killed before a word was written, or damaged
+        if before == now:
+            return
+        if isinstance(before, dict):
+            changed = [
+                f"{key}: {before.get(key)}, now {value}"
+                for key, value in now.items()
+                if before.get(key) != value and not isinstance(value, list | dict)
+            ]
+            report(f"{path}: unfinished work with other settings ({'; '.join(changed)}) was there; starting over")
+        shutil.rmtree(folder)
+    make_folder(folder)
+    write_json(folder / _RECIPE, now)
+
+
+def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
+    """Everything but the rows; then the corpus gets its name."""
+    entries, body, folder, features = work.entries, work.body, work.corpus, plan.features
+    if body is None:
+        reason = f" the first of {work.done}: {work.skipped[0].reason}" if work.skipped else ""
+        raise InputError(f"no recordings to prepare; check the source.{reason}")
+    if work.spread > 0.001:
+        report(
+            f"bone lengths differ between recordings by up to {work.spread * 100:.1f} cm;"
+            f" rotations are kept, positions use those of {entries[0].name}"
+        )
+    work.finish_arrays()
+    parts = [entry.split if plan.official else "" for entry in entries]
+    splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
+    if not splits["train"]:
+        raise InputError(f"{path}: no recording is left for training; add some, or split by the seed (--random-split).")
+    _write_statistics(folder, entries, splits)
+    files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
+    if plan.parts:
+        write_json(folder / PARTS, plan.parts)
+        files.append(PARTS)
+    hashes = {name: sha256_file(folder / name) for name in files}
+    manifest = {
+        "format": FORMAT,
+        "version": VERSION_ON_DEMAND if plan.parts else VERSION,
+        "package": __version__,
+        "fingerprint": hashlib.sha256("".join(hashes.values()).encode()).hexdigest(),
+        "recipe": plan.recipe,
+        **features.to_json(),
+        "seconds": work.frames / features.fps,
+        **body_to_json(body),
+        "recordings": [asdict(entry) for entry in entries],
+        "splits": {name: [list(segment) for segment in segments] for name, segments in splits.items()},
+        "arrays": hashes,
+        "skipped": [asdict(item) for item in work.skipped],
+    }
+    write_json(folder / MANIFEST, manifest)
+    folder.replace(path)
+    shutil.rmtree(work.folder, ignore_errors=True)
+
+
+def _write_statistics(folder: Path, entries: list[Entry], splits: Splits) -> None:
+    """Means and standard deviations over the training split only."""
+    values: dict[str, Any] = {}
+    for name in ARRAYS:
+        key = name.removesuffix(".npy")
+        array = np.load(folder / name, mmap_mode="r", allow_pickle=False)
+        running = RunningStatistics()
+        for recording, start, stop in splits["train"]:
+            first = entries[recording].first
+            for row in range(first + start, first + stop, _ROWS):
+                running.add(array[row : min(row + _ROWS, first + stop)])
+        statistics = running.result(_FLOORS[key])
+        values[f"{key}_mean"], values[f"{key}_std"] = statistics.mean, statistics.std
+    np.savez(folder / "statistics.npz", **values)

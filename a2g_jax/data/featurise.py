@@ -1,0 +1,118 @@
+"""One recording as rows of a corpus: features and motion at the same frame times."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int16
+
+from a2g_jax.data.recording import PoseRecording, Recording
+from a2g_jax.data.settings import Features
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import log_mel
+from a2g_jax.geometry.motion import Motion, resample
+from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack, resample_track
+from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_skeleton
+from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One recording as rows of a corpus."""
+
+    name: str
+    audio: Float[np.ndarray, "T width"]
+    pose: Float[np.ndarray, "T R D"]
+    root: Float[np.ndarray, "T 3"]
+    waveform: Int16[np.ndarray, " N"] | None
+    """As many samples as the frames last, where the corpus keeps them."""
+    body: Skeleton | PoseLayout
+    """What the rows of a pose are."""
+    speaker: str
+    emotion: str
+    split: str
+    """Official part of the data set, or empty."""
+    sources: tuple[str, ...]
+    annotations: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A recording that cannot be prepared."""
+
+    name: str
+    sources: tuple[str, ...]
+    reason: str
+
+
+def prepare_recording(recording: Recording | PoseRecording, features: Features, split: str = "") -> Prepared:
+    """Features and motion of one recording, as many frames as both have.
+
+    Args:
+        split: the recording's official part of the data set, if any.
+
+    Raises:
+        InputError: audio and motion differ in length by more than a second and 5 %, the audio has another rate, the
+            rig is not understood, or the motion does not tell such poses.
+    """
+    where = " and ".join(recording.sources) or recording.name
+    mel, fps = features.mel, features.fps
+    if recording.sample_rate != mel.sample_rate:
+        raise InputError(f"{where}: has {recording.sample_rate} Hz audio; expected {mel.sample_rate} Hz.")
+    heard, seen = len(recording.audio) / recording.sample_rate, recording.motion.seconds
+    if abs(heard - seen) > max(1.0, 0.05 * max(heard, seen)):
+        raise InputError(
+            f"{where}: audio lasts {heard:.2f} s and motion {seen:.2f} s; cut them to the same take, or correct the"
+            " motion's frame time."
+        )
+    frames = min(round(heard * fps), round(seen * fps))
+    if frames < 2:
+        raise InputError(f"{where}: gives {frames} frames at {fps:g} fps; use longer recordings or a higher --fps.")
+    motion: Motion | PoseTrack
+    if isinstance(recording.motion, PoseTrack):
+        motion = resample_track(recording.motion, fps, frames)
+        root = np.zeros((frames, 3), np.float32)
+    else:
+        motion = resample(choose_joints(recording.motion, features.joints, where), fps, frames)
+        root = np.asarray(motion.root, np.float32)
+    pose, body = represent(motion, features.pose, where)
+    return Prepared(
+        name=recording.name,
+        audio=log_mel(recording.audio, mel, fps, frames),
+        pose=pose,
+        root=root,
+        waveform=_waveform(recording.audio, round(frames * mel.sample_rate / fps)) if features.waveform else None,
+        body=body,
+        speaker=recording.speaker,
+        emotion=recording.emotion,
+        split=split,
+        sources=recording.sources,
+        annotations={"words": [asdict(word) for word in recording.words], **recording.annotations},
+    )
+
+
+def choose_joints(motion: Motion, joints: str, where: str) -> Motion:
+    """The motion on the joints that a corpus keeps.
+
+    A rig is retargeted to the 22 body joints, or to the 47 of the upper body: standing upright with y up and facing z,
+    in metres, its rest pose a T, so that the same numbers mean the same pose whatever the rig was.
+
+    Raises:
+        InputError: the rig is not understood.
+    """
+    if joints == "all" or (joints == "body" and motion.skeleton.names == BODY_JOINTS):
+        return motion
+    try:
+        rig = find_rig(motion, name=where)
+    except InputError as error:
+        raise InputError(f"{error} With --joints all the rig is taken as it is.") from None
+    target = body_skeleton(rig) if joints == "body" else upper_body_skeleton(rig)
+    return retarget(motion, target, source=rig)
+
+
+def _waveform(audio: Float[np.ndarray, " N"], samples: int) -> Int16[np.ndarray, " n"]:
+    """16-bit samples, with silence where the audio ends first."""
+    whole = np.zeros(samples, np.float32)
+    whole[: len(audio)] = audio[:samples]
+    return np.rint(np.clip(whole, -1.0, 1.0) * 32767.0).astype(np.int16)

@@ -1,0 +1,143 @@
+"""What is scored beside a model: the truth, other right motions, and motions that are nobody's answer to the audio.
+
+Every candidate is poses of one test stretch, as the corpus writes them down, as many frames as the stretch has.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.splits import Segment
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
+from a2g_jax.talker.recordings import resample_motion, talk
+
+Pose = Float[np.ndarray, "T R D"]
+
+#: Seconds of audio that are looked up at once in the training split.
+NEIGHBOUR_SECONDS = 4.0
+#: Stretches compared at once: bounds memory at about 50 MB.
+_CHUNK = 1500
+
+
+def mean_pose(corpus: Corpus, segment: Segment) -> Pose:
+    """The training split's mean pose, standing still."""
+    return np.tile(_mean(corpus)[None], (segment.frames, 1, 1)).astype(np.float32)
+
+
+def _mean(corpus: Corpus) -> Float[np.ndarray, "R D"]:
+    mean = np.asarray(corpus.statistics["pose"].mean)
+    if corpus.representation == "directions":
+        return mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
+    return mean
+
+
+def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:
+    """The motion of the next test stretch, begun anew where it is shorter; of a single one, its own second half first.
+
+    Someone's real motion, but not to this audio.
+    """
+    segment = segments[number]
+    if len(segments) == 1:
+        pose = np.asarray(corpus.pose[segment.start : segment.stop])
+        return np.roll(pose, len(pose) // 2, axis=0)
+    other = segments[(number + 1) % len(segments)]
+    rows = other.start + np.arange(segment.frames) % other.frames
+    return np.asarray(corpus.pose[rows])
+
+
+def with_noise(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
+    """The truth with every joint turned, anew in each frame, about a random axis (Audio2Gestures, Table 4).
+
+    Args:
+        degrees: standard deviation of each component of the turn.
+    """
+    turns = matrix_from_axis_angle(jnp.asarray(rng.normal(0.0, np.deg2rad(degrees), (*pose.shape[:2], 3)), jnp.float32))
+    rotations = np.asarray(matrix_from_6d(np.asarray(pose, np.float32))) @ np.asarray(turns)
+    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*pose.shape)
+
+
+def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
+    """The training motion whose audio is most like this one's, four seconds at a time.
+
+    Distance is that of normalised log-mel rows; training audio is tried at every half second.
+
+    Raises:
+        InputError: no training stretch is that long.
+    """
+    window = min(segment.frames, round(NEIGHBOUR_SECONDS * corpus.fps))
+    step = max(1, round(0.5 * corpus.fps))
+    starts = np.array(
+        [
+            row
+            for one in corpus.segments("train")
+            for row in range(one.start, one.stop - window + 1, step)
+            # Where the training split itself is scored, nothing is its own neighbour.
+            if row >= segment.stop or row + window <= segment.start
+        ],
+        np.int64,
+    )
+    if len(starts) == 0:
+        raise InputError(f"{corpus.path}: has no other training stretch of {window} frames to look neighbours up in.")
+    # The last stretch ends with the clip, and overlaps the one before it.
+    firsts = [*range(0, segment.frames - window + 1, window)]
+    if firsts[-1] + window < segment.frames:
+        firsts.append(segment.frames - window)
+    wanted = _windows(corpus, segment.start + np.array(firsts), window)
+    best, least = np.zeros(len(firsts), np.int64), np.full(len(firsts), np.inf)
+    for chunk in range(0, len(starts), _CHUNK):
+        some = starts[chunk : chunk + _CHUNK]
+        there = _windows(corpus, some, window)
+        # |a - b|^2 without |b|^2, which is the same for all.
+        distance = np.sum(np.square(there), axis=1)[:, None] - 2.0 * there @ wanted.T
+        nearest = np.argmin(distance, axis=0)
+        values = distance[nearest, np.arange(len(firsts))]
+        best = np.where(values < least, some[nearest], best)
+        least = np.minimum(values, least)
+    pose = np.empty((segment.frames, *corpus.pose.shape[1:]), np.float32)
+    for first, start in zip(firsts, best, strict=True):
+        pose[first : first + window] = corpus.pose[start : start + window]
+    return pose
+
+
+def _windows(corpus: Corpus, starts: Int[np.ndarray, " n"], frames: int) -> Float[np.ndarray, "n values"]:
+    """Normalised audio rows from each start on, side by side."""
+    rows = np.asarray(corpus.audio)[starts[:, None] + np.arange(frames)[None]]
+    return np.asarray(corpus.statistics["audio"].normalise(rows), np.float32).reshape(len(starts), -1)
+
+
+def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> list[Pose] | None:
+    """Other motions that are right for the same audio, drawn from the generator itself; None for real recordings.
+
+    Raises:
+        InputError: the corpus was generated by another version.
+    """
+    role = _role(corpus, segment)
+    if role is None:
+        return None
+    options: dict[str, Any] = corpus.recipe
+    recording = talk(**role, fps=corpus.fps, sample_rate=corpus.mel.sample_rate, fingers=bool(options["fingers"]))
+    entry = corpus.recordings[segment.recording]
+    first = segment.start - entry.first
+    key = jax.random.fold_in(jax.random.key(seed), segment.recording)
+    poses = []
+    for number in range(samples):
+        motion, _ = resample_motion(recording, jax.random.fold_in(key, number))
+        pose, _ = represent(motion, corpus.representation, entry.name)
+        poses.append(pose[first : first + segment.frames])
+    return poses
+
+
+def _role(corpus: Corpus, segment: Segment) -> dict[str, Any] | None:
+    """How a generated recording was made, if it was, and shown as it is."""
+    recipe = corpus.recipe
+    if recipe.get("reader") != "talker" or recipe.get("view", "body") != "body" or recipe.get("jitter", 0.0) != 0.0:
+        return None
+    roles = [*recipe.get("roles", ()), *corpus.later.get("stored", ())]
+    name = corpus.recordings[segment.recording].name
+    return next((dict(role) for role in roles if role["name"] == name), None)

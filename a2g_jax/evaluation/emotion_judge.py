@@ -1,0 +1,87 @@
+"""What is known about the recordings that are scored: emotions for a classifier, and where gestures carry meaning."""
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.batch import Batch
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.splits import Segment
+from a2g_jax.errors import InputError
+from a2g_jax.evaluation.places import Pose
+from a2g_jax.io.files import sha256_file
+from a2g_jax.models.emotion_classifier.model import classify
+from a2g_jax.training.perceptual import check_sight
+from a2g_jax.training.run import WEIGHTS_FILE, Run, load_run
+
+
+@dataclass(frozen=True, eq=False)
+class EmotionJudge:
+    """A trained classifier of emotions in motion."""
+
+    run: Run
+    fingerprint: str
+    """SHA-256 of its weights."""
+
+    @cached_property
+    def _logits(self) -> Any:
+        config = self.run.config
+        data = config.data()
+        return jax.jit(
+            lambda params, pose: classify(
+                config.model_config, data, params, Batch(jnp.zeros((*pose.shape[:2], data.audio_bands)), pose)
+            )
+        )
+
+    def accuracy(self, pose: Pose, emotion: str) -> float:
+        """Share of the motion's clips that are taken for the emotion (EmotionGesture's EA); NaN for too short ones and
+        for emotions that the classifier does not know."""
+        frames: int = self.run.config.model_config.clip_frames
+        known, count = self.run.config.corpus["emotions"], len(pose) // frames
+        if count == 0 or emotion not in known:
+            return float("nan")
+        clips = np.asarray(pose[: count * frames], np.float32).reshape(count, frames, *pose.shape[1:])
+        logits = np.asarray(self._logits(self.run.params, clips))
+        return float(np.mean(np.argmax(logits, axis=-1) == known.index(emotion)))
+
+
+def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> EmotionJudge:
+    """A run of ``emotion_classifier`` that looks at such motion as a corpus has.
+
+    Raises:
+        InputError: another model, one that listens to audio, or one for other poses, rates or emotions.
+    """
+    run = load_run(folder)
+    config = run.config
+    if config.model != "emotion_classifier" or config.model_config.input != "motion":
+        raise InputError(
+            f"{folder}: is no classifier of emotions in motion; train one with 'a2g train"
+            " emotion_classifier --input motion'."
+        )
+    check_sight(str(folder), config, corpus)
+    if not set(corpus.emotions) & set(config.corpus["emotions"]):
+        raise InputError(
+            f"{folder}: knows the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."
+        )
+    return EmotionJudge(run, sha256_file(Path(folder) / WEIGHTS_FILE))
+
+
+def relevance(corpus: Corpus, segment: Segment) -> Float[np.ndarray, " T"] | None:
+    """How much the gesture of each frame means, from the recording's semantic labels; None where it has none."""
+    entry = corpus.recordings[segment.recording]
+    labels = corpus.annotations(segment.recording).get("semantic")
+    if not labels:
+        return None
+    values = np.zeros(entry.frames)
+    for label in labels:
+        first, stop = round(label["start"] * corpus.fps), round(label["end"] * corpus.fps)
+        values[first:stop] = np.maximum(values[first:stop], max(label["score"], 0.0))
+    cut: Float[np.ndarray, " T"] = values[segment.start - entry.first : segment.stop - entry.first]
+    return cut if cut.any() else None

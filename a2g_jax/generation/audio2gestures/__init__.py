@@ -1,0 +1,1 @@
+"""Generation with a trained Audio2Gestures: its latent space, and clips pinned to the timeline."""

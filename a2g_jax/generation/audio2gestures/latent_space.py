@@ -1,0 +1,162 @@
+"""The latent space of a trained Audio2Gestures, to look at and to change: what the notebooks work with."""
+
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.features.dct import block_dct
+from a2g_jax.features.mel import log_mel
+from a2g_jax.generation.engine import WINDOW
+from a2g_jax.geometry.ground import plant_feet
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
+from a2g_jax.models.audio2gestures.codec import Codec
+from a2g_jax.models.audio2gestures.edits import apply_edits, parse_edit
+from a2g_jax.models.audio2gestures.model import build, draw_codes
+from a2g_jax.nn.noise import BLOCK
+from a2g_jax.training.run import Run
+
+Code = Float[Array, "T C"]
+
+
+@dataclass(frozen=True)
+class Codes:
+    """Both codes of a stretch of motion in time, with whole blocks of context before and after it."""
+
+    shared: Code
+    specific: Code
+    context: int
+    """Frames before the stretch; it ends before at least as many."""
+    frames: int
+    """Of the stretch itself."""
+
+    def bands(self, name: str, points: int = BLOCK) -> Float[np.ndarray, "points C"]:
+        """Root mean square of each DCT band over the stretch's blocks.
+
+        Args:
+            name: ``"shared"`` or ``"specific"``.
+        """
+        stop = self.context + -(-self.frames // points) * points
+        inside = block_dct(getattr(self, name)[self.context : stop], points)
+        blocks = np.asarray(inside).reshape(-1, points, inside.shape[-1])
+        root: Float[np.ndarray, "points C"] = np.sqrt(np.mean(np.square(blocks), axis=0))
+        return root
+
+
+class LatentSpace:
+    """The codes of speech and motion, and back to motion; compiles once for each number of 1024-frame windows."""
+
+    def __init__(self, run: Run) -> None:
+        """
+        Raises:
+            InputError: the run is not of Audio2Gestures on a skeleton with both codes.
+        """
+        config = run.config.model_config
+        if run.config.model != "audio2gestures" or not config.split:
+            raise InputError(
+                f"a run of {run.config.model} has no shared and specific codes; take one of audio2gestures."
+            )
+        self._skeleton, self._run = run.config.skeleton, run
+        self.points: int = config.dct_points
+        data = run.config.data()
+        networks = Codec(replace(config, edits=()), data)
+        model = build(networks.config, data)
+        self._context = -(-model.halo // BLOCK) * BLOCK
+        self._params, self._summary = jax.device_put(run.params), jax.device_put(run.summary)
+
+        def draw(params, summary, audio, key):
+            shared = networks.encode_audio(params, audio[None])
+            return draw_codes(networks, params, summary, key, shared, jnp.int32(-self._context))
+
+        def encode(params, pose):
+            shared, specific = networks.encode_motion(params, pose[None])
+            assert specific is not None
+            return networks.to_time(shared.mean), networks.to_time(specific.mean)
+
+        self._draw, self._encode = jax.jit(draw), jax.jit(encode)
+        self._decode = jax.jit(lambda params, s, i: matrix_from_6d(networks.decode(params, s[None], i[None])[0]))
+
+    def from_audio(self, audio: Float[np.ndarray, " N"], seed: int = 0, sample: int = 0) -> Codes:
+        """S_A of speech, and an I_R drawn for it: what ``a2g generate --seed`` has for the sample of that number.
+
+        Args:
+            audio: mono, at the run's sample rate.
+        """
+        config = self._run.config
+        frames = round(len(audio) / config.mel.sample_rate * config.fps)
+        if frames == 0:
+            raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
+        features = log_mel(audio, config.mel, config.fps, frames)
+        padded = np.pad(features, ((self._context, self._after(frames)), (0, 0)), constant_values=features.min())
+        normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)
+        key = jax.random.fold_in(jax.random.key(seed), sample)
+        shared, specific = self._draw(self._params, self._summary, normalised, key)
+        assert specific is not None
+        return Codes(shared[0], specific[0], self._context, frames)
+
+    def from_motion(self, motion: Motion) -> Codes:
+        """S_M and I_M of a motion of the run's skeleton and frame rate; its first and last pose are held around it.
+
+        Raises:
+            InputError: another skeleton or frame rate.
+        """
+        if not motion.skeleton.same_tree(self._skeleton) or motion.fps != self._run.config.fps:
+            raise InputError(
+                f"the motion has {motion.skeleton.joints} joints at {motion.fps:g} fps, the run"
+                f" {self._skeleton.joints} at {self._run.config.fps:g}; retarget and resample it first."
+            )
+        pose = np.asarray(matrix_to_6d(jnp.asarray(motion.rotations)))
+        around = ((self._context, self._after(len(pose))), (0, 0), (0, 0))
+        shared, specific = self._encode(self._params, np.pad(pose, around, mode="edge"))
+        return Codes(shared[0], specific[0], self._context, len(pose))
+
+    def to_motion(self, codes: Codes) -> Motion:
+        """g(S, I), with a root that plants the feet."""
+        stop = codes.context + codes.frames
+        rotations = np.asarray(self._decode(self._params, codes.shared, codes.specific))[codes.context : stop]
+        config = self._run.config
+        return plant_feet(
+            Motion(rotations, np.zeros((len(rotations), 3), np.float32), self._skeleton, config.fps),
+            np.asarray(config.statistics["root"].mean),
+            np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean))),
+        )
+
+    def edit(self, codes: Codes, *edits: str, other: Codes | None = None) -> Codes:
+        """Codes with their DCT bands edited; see :mod:`a2g_jax.models.audio2gestures.edits`.
+
+        Args:
+            other: where ``swap`` and ``sample`` take their bands from; at least as long.
+
+        Raises:
+            InputError: a line that is no edit, or one that needs ``other``.
+        """
+        parsed = [parse_edit(text, self.points) for text in edits]
+        if other is None and any(edit.action in ("swap", "sample") for edit in parsed):
+            raise InputError(f"{', '.join(edits)}: takes bands from another code; give one as 'other'.")
+        if other is not None and other.frames < codes.frames:
+            raise InputError(f"the other codes are {other.frames} frames long, these {codes.frames}; give longer ones.")
+
+        def changed(name: str) -> Code:
+            code: Code = getattr(codes, name)
+            chosen = [edit for edit in parsed if edit.code == name]
+            return apply_edits(code, chosen, self.points, lambda _edit: getattr(other, name)[: len(code)])
+
+        return replace(codes, shared=changed("shared"), specific=changed("specific"))
+
+    def swap(self, codes: Codes, other: Codes) -> Codes:
+        """These shared codes with the other's specific ones.
+
+        Raises:
+            InputError: the other is shorter.
+        """
+        if other.frames < codes.frames:
+            raise InputError(f"the other codes are {other.frames} frames long, these {codes.frames}; give longer ones.")
+        return replace(codes, specific=other.specific[: len(codes.shared)])
+
+    def _after(self, frames: int) -> int:
+        """Context behind, so that all speech up to a window's length shares a compiled program."""
+        return -frames % WINDOW + self._context

@@ -1,0 +1,128 @@
+"""How closely pins are followed, and how smooth their seams are."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.generation.audio2gestures.pins import Pin
+from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.kinematics import joint_positions
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.metrics.physical import jerk
+
+#: Seconds on either side of a seam in which its jerk is looked at, where the blend is no wider.
+SEAM = 0.25
+#: A pin counts as followed below this share of what the unpinned motion is away from the clip.
+FOLLOWED = 0.5
+#: Most frames of a corpus that are looked at for its percentile.
+_MOST = 200_000
+
+
+def local_places(motion: Motion) -> Float[np.ndarray, "T J 3"]:
+    """Joint positions with the root at the origin, metres."""
+    places = motion.positions()
+    local: Float[np.ndarray, "T J 3"] = places - places[:, :1]
+    return local
+
+
+def wrist_jerk(places: Float[np.ndarray, "T J 3"], skeleton: Skeleton, fps: float) -> Float[np.ndarray, " t"]:
+    """The larger of both wrists' jerks, m/s3, three frames fewer; of all joints where there are no wrists."""
+    return np.asarray(jerk(places[:, _wrists(skeleton)], fps)).max(axis=1)
+
+
+def _wrists(skeleton: Skeleton) -> list[int]:
+    body = find_body(skeleton)
+    if body is None:
+        return list(range(skeleton.joints))
+    return [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
+
+
+def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
+    """A percentile of wrist jerk in a corpus's training motion, m/s3.
+
+    Raises:
+        InputError: its poses are not rotations.
+    """
+    corpus.require_pose("6d")
+    values, seen = [], 0
+    for segment in corpus.segments("train"):
+        pose = np.asarray(corpus.pose[segment.start : segment.stop], np.float32)
+        offsets = np.asarray(corpus.skeleton.offsets, np.float32)
+        places = np.asarray(joint_positions(matrix_from_6d(pose), offsets, corpus.skeleton.parents))
+        values.append(wrist_jerk(places, corpus.skeleton, corpus.fps))
+        seen += segment.frames
+        if seen > _MOST:
+            break
+    return float(np.percentile(np.concatenate(values), percentile))
+
+
+def report_pins(
+    pins: Sequence[Pin], pinned: Motion, plain: Motion, limit: float, source: str, blend: float = 0.75
+) -> list[dict[str, Any]]:
+    """For each pin, JSON-able: its place, how far the pinned and the unpinned motion are from it, and its seams' jerk.
+
+    Args:
+        pinned: the motion with the pins; ``plain``: the same sample without.
+        limit: jerk that seams should stay below, m/s3.
+        source: whose it is.
+        blend: seconds of blending on either side; a seam is looked at as far as that, and a quarter second at least.
+
+    Returns:
+        ``file``, ``start``, ``end`` (s), ``turned`` (degrees), ``error_cm``, ``unpinned_error_cm`` (mean distance of
+        joints, root at the origin), the same of the wrists, ``followed`` (of all joints), ``seam_jerk`` (m/s3, the
+        largest within reach of either end; 0 for a clip that fills the whole motion and has no seam), ``jerk_limit``,
+        ``jerk_limit_source``, ``smooth``.
+    """
+    fps, skeleton = pinned.fps, pinned.skeleton
+    ours, without = local_places(pinned), local_places(plain)
+    jerks = wrist_jerk(ours, skeleton, fps)
+    wrists, width = _wrists(skeleton), round(max(SEAM, blend) * fps)
+    rows = []
+    for pin in pins:
+        distances = [
+            100.0 * np.linalg.norm(places[pin.first : pin.stop] - local_places(pin.motion), axis=-1)
+            for places in (ours, without)
+        ]
+        error, before = (float(distance.mean()) for distance in distances)
+        wrist_error, wrist_before = (float(distance[:, wrists].mean()) for distance in distances)
+        # Before the first and after the last frame; where the motion begins or ends there is nothing to join. Value k
+        # is of frames k to k + 3.
+        seams = [at for at in (pin.first, pin.stop) if 0 < at < pinned.frames]
+        parts = [jerks[max(0, at - width - 2) : at + width] for at in seams]
+        seam = max((float(part.max()) for part in parts if len(part)), default=0.0)
+        rows.append(
+            {
+                "file": pin.name,
+                "start": pin.first / fps,
+                "end": pin.stop / fps,
+                "turned": pin.turned,
+                "error_cm": error,
+                "unpinned_error_cm": before,
+                "wrist_error_cm": wrist_error,
+                "unpinned_wrist_error_cm": wrist_before,
+                "followed": error < FOLLOWED * before,
+                "seam_jerk": seam,
+                "jerk_limit": limit,
+                "jerk_limit_source": source,
+                "smooth": seam < limit,
+            }
+        )
+    return rows
+
+
+def describe(row: dict[str, Any]) -> str:
+    """A line about one pin for the terminal."""
+    followed = "" if row["followed"] else ", NOT FOLLOWED"
+    rough = "" if row["smooth"] else ", ROUGH SEAM"
+    turned = f", turned by {row['turned']:.0f} degrees" if abs(row["turned"]) >= 1.0 else ""
+    return (
+        f"{row['file']} at {row['start']:.2f} to {row['end']:.2f} s{turned}: {row['error_cm']:.1f} cm from the clip"
+        f" (unpinned {row['unpinned_error_cm']:.1f} cm), wrists {row['wrist_error_cm']:.1f} cm (unpinned"
+        f" {row['unpinned_wrist_error_cm']:.1f} cm){followed}; jerk at the seams {row['seam_jerk']:.0f} m/s3 (limit"
+        f" {row['jerk_limit']:.0f}, {row['jerk_limit_source']}){rough}"
+    )

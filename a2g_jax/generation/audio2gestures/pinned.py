@@ -1,0 +1,94 @@
+"""Samples with clips pinned to their timeline, and what is said about them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
+from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
+from a2g_jax.generation.audio2gestures.pin_report import corpus_jerk, local_places, report_pins, wrist_jerk
+from a2g_jax.generation.audio2gestures.pins import Pin, check_pins, pin_codes, read_pin
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.rotation import matrix_from_6d
+from a2g_jax.training.run import Run
+
+if TYPE_CHECKING:
+    from a2g_jax.viz.player import Track
+
+
+@dataclass(frozen=True)
+class Pins:
+    """What is asked for."""
+
+    texts: tuple[str, ...]
+    """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
+    blend: float = 0.75
+    """Seconds on either side of a clip."""
+    shared: float = 0.0
+    """From 0 to 1, how far a clip's own shared code replaces the audio's."""
+    corpus: Corpus | None = None
+    """Whose 99th percentile of wrist jerk seams are held against; without one, the clips' and the unpinned sample's."""
+
+    def place(self, run: Run, frames: int) -> "Pinned":
+        """The clips on a run's skeleton, in speech of so many frames.
+
+        Raises:
+            InputError: a run without codes, a clip that cannot be used, one that ends too late, or two that overlap.
+        """
+        space = LatentSpace(run)
+        config = run.config
+        facing = np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean[0])), np.float64)
+        pins = [read_pin(text, config.skeleton, config.fps, facing) for text in self.texts]
+        if self.corpus is not None and not self.corpus.skeleton.same_tree(config.skeleton):
+            raise InputError(f"--pin-corpus {self.corpus.path}: has another skeleton than the run.")
+        limit = None if self.corpus is None else corpus_jerk(self.corpus)
+        return Pinned(self, run, space, tuple(check_pins(pins, frames, config.fps)), limit)
+
+
+@dataclass(frozen=True, eq=False)
+class Pinned:
+    """Clips in their places, ready for samples."""
+
+    request: Pins
+    run: Run
+    space: LatentSpace
+    pins: tuple[Pin, ...]
+    limit: float | None
+    """Jerk of the corpus, m/s3."""
+
+    def stream(
+        self, audio: Float[np.ndarray, " N"], samples: int, seed: int, reports: list[list[dict[str, Any]]]
+    ) -> Iterator[Motion]:
+        """Samples as :meth:`~a2g_jax.generation.engine.Generator.stream` makes them, with the pins in them.
+
+        Args:
+            reports: what is found about each sample's pins is put here.
+        """
+        edits = self.run.config.model_config.edits
+        for sample in range(samples):
+            codes = self.space.edit(self.space.from_audio(audio, seed, sample), *edits)
+            plain = self.space.to_motion(codes)
+            changed = pin_codes(self.space, codes, self.pins, blend=self.request.blend, shared=self.request.shared)
+            motion = self.space.to_motion(changed)
+            limit, source = self.limit, "99th percentile of the corpus"
+            if limit is None:
+                limit, source = self._usual(plain), "99th percentile of the clips and the unpinned sample"
+            reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
+            yield motion
+
+    def lane(self) -> "Track":
+        """The pinned stretches for the page's timeline."""
+        from a2g_jax.viz.player import Track
+
+        spans = tuple((pin.start, pin.start + pin.motion.seconds, Path(pin.name).stem, "hold") for pin in self.pins)
+        return Track("pinned", spans)
+
+    def _usual(self, plain: Motion) -> float:
+        motions = [plain, *(pin.motion for pin in self.pins if pin.motion.frames > 3)]
+        values = [wrist_jerk(local_places(motion), motion.skeleton, motion.fps) for motion in motions]
+        return float(np.percentile(np.concatenate(values), 99.0))

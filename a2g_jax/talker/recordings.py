@@ -1,0 +1,143 @@
+"""Whole recordings of the generated corpus: a plan, its voice, and one of its many right motions."""
+
+import zlib
+from dataclasses import asdict
+from typing import Any
+
+import jax
+import numpy as np
+
+from a2g_jax.data.recording import Recording, Word
+from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.talker.augment import augment
+from a2g_jax.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.talker.gestures import gesticulate
+from a2g_jax.talker.plan import plan_speech
+from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON
+from a2g_jax.talker.speakers import SPEAKERS
+from a2g_jax.talker.speech import Phrase, PlannedWord, SpeechPlan, Syllable
+from a2g_jax.talker.truth import GestureTruth
+from a2g_jax.talker.voice import synthesise
+
+#: Length of one recording of a corpus, seconds.
+RECORDING_SECONDS = 60.0
+# What a recording's seed is split into; new uses get new numbers, so that old seeds keep their meaning.
+_SPEECH, _VOICE, _MOTION, _CAST, _ROOM = range(5)
+
+
+def talk(
+    seconds: float,
+    seed: int,
+    *,
+    speaker: str = "ada",
+    emotion: str = "neutral",
+    fps: float = 30.0,
+    sample_rate: int = 16000,
+    name: str = "",
+    room: bool = False,
+    fingers: bool = False,
+) -> Recording:
+    """Generate one recording: someone says something in an invented language, and gestures.
+
+    The same arguments always give the same recording. ``annotations`` holds the speech plan under ``"speech"`` and the
+    truth about the motion under ``"gestures"``.
+
+    Args:
+        seconds: length, 2 or more.
+        seed: of everything that is drawn.
+        speaker: one of :data:`~a2g_jax.talker.speakers.SPEAKERS`.
+        emotion: one of :data:`~a2g_jax.talker.emotions.VOICE_EMOTIONS`.
+        room: as heard by some microphone in some room, with noise, instead of clean.
+        fingers: move on the skeleton with finger joints; the body moves the same without.
+
+    Raises:
+        InputError: unknown speaker or emotion, or too short.
+    """
+    for kind, value, known in (("speaker", speaker, SPEAKERS), ("emotion", emotion, VOICE_EMOTIONS)):
+        if value not in known:
+            raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
+    # One seed makes different people say different things, in different moods too.
+    role = zlib.crc32(f"{speaker}/{emotion}".encode())
+    plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
+    motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps, fingers)
+    audio = synthesise(plan, np.random.default_rng([seed, _VOICE, role]), sample_rate)
+    if room:
+        audio = augment(audio, sample_rate, np.random.default_rng([seed, _ROOM]))
+    return Recording(
+        name=name or f"talker_{seed}_{speaker}_{emotion}",
+        audio=audio,
+        sample_rate=sample_rate,
+        motion=motion,
+        words=tuple(Word(word.text, word.start, word.end) for word in plan.words),
+        speaker=speaker,
+        emotion=emotion,
+        annotations={"speech": asdict(plan), "gestures": asdict(truth)},
+    )
+
+
+def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTruth]:
+    """Another right motion for the same audio: everything that the audio leaves open is drawn anew.
+
+    This is a draw from the true conditional distribution that a model of the corpus should learn. It has fingers if the
+    recording's motion has them.
+
+    Args:
+        recording: made by :func:`talk`, or read back with its annotations.
+        key: an integer or a typed JAX key.
+
+    Raises:
+        InputError: the recording is not a generated one.
+    """
+    if "speech" not in recording.annotations:
+        raise InputError(f"{recording.name}: is not a generated recording, so its true distribution is unknown.")
+    plan = plan_from_json(recording.annotations["speech"])
+    words = (
+        [int(key)] if isinstance(key, int | np.integer) else [int(word) for word in jax.random.key_data(key).ravel()]
+    )
+    fingers = recording.motion.skeleton.same_tree(TALKER_HANDS_SKELETON)
+    return gesticulate(plan, np.random.default_rng([_MOTION, 1, *words]), recording.motion.fps, fingers)
+
+
+def plan_from_json(value: dict[str, Any]) -> SpeechPlan:
+    """A speech plan from the dictionary in a recording's annotations."""
+    return SpeechPlan(
+        **{
+            **value,
+            "phrases": tuple(Phrase(**phrase) for phrase in value["phrases"]),
+            "words": tuple(PlannedWord(**word) for word in value["words"]),
+            "syllables": tuple(Syllable(**{**item, "phones": tuple(item["phones"])}) for item in value["syllables"]),
+        }
+    )
+
+
+def cast(
+    minutes: float, seed: int, speakers: tuple[str, ...] = (), emotions: tuple[str, ...] = ()
+) -> list[dict[str, Any]]:
+    """Who says what in a corpus: arguments of :func:`talk` for each recording of a minute (the last may be shorter).
+
+    Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording is
+    heard in a room, so that models trained on the corpus also hear speech that was not recorded in a studio.
+    """
+    known_speakers, known_emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
+    total = minutes * 60.0
+    if total < 10.0:
+        raise InputError(f"{minutes} minutes of talk are too few; ask for 0.2 or more.")
+    count = max(1, round(total / RECORDING_SECONDS))
+    rng = np.random.default_rng([seed, _CAST])
+    roles = []
+    for index in range(count):
+        if index % len(known_speakers) == 0:
+            order = rng.permutation(len(known_speakers))
+        neutral = "neutral" in known_emotions and rng.random() < 0.5
+        roles.append(
+            {
+                "seconds": total / count,
+                "seed": int(rng.integers(2**31)),
+                "speaker": known_speakers[order[index % len(known_speakers)]],
+                "emotion": "neutral" if neutral else str(rng.choice(known_emotions)),
+                "name": f"{index:04d}",
+                "room": index % 2 == 1,
+            }
+        )
+    return roles
