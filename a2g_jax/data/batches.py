@@ -1,12 +1,13 @@
 """Random clips of a corpus, as a function of a key alone."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, Key
+from jaxtyping import Array, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.data.corpus import Corpus
@@ -62,38 +63,28 @@ def draw_starts(key: Key[Array, ""], crops: Crops, batch_size: int) -> Int[Array
     return jnp.asarray(crops.first)[segment] + drawn - before
 
 
-def gather(array: Float[Array, "N *rest"], starts: Int[Array, " B"], frames: int) -> Float[Array, "B T *rest"]:
-    """Clips of an array that lies on the device."""
-    return jax.vmap(lambda start: jax.lax.dynamic_slice_in_dim(array, start, frames))(starts)
-
-
-def gather_from_disk(
-    array: Float[np.ndarray, "N *rest"], starts: Int[np.ndarray, " B"], frames: int
-) -> Float[np.ndarray, "B T *rest"]:
-    """Clips of an array that is too large for the device."""
-    return np.stack([array[start : start + frames] for start in starts])
-
-
 @dataclass(frozen=True)
-class Dressing:
-    """What happens to a raw clip before a model sees it."""
+class BatchMaker:
+    """From raw clips to the batch that a model is trained on."""
 
     audio_statistics: Statistics
     augmentation: float
     """Strength of :func:`~a2g_jax.features.augment.augment_log_mel`; 0 for none."""
 
-    def __call__(
-        self,
-        key: Key[Array, ""] | None,
-        audio: Float[Array, "B T width"],
-        pose: Float[Array, "B T R D"],
-        labels: Int[Array, "B 2"],
-    ) -> Batch:
-        """Normalised, and augmented when a key is given."""
+    def __call__(self, key: Key[Array, ""] | None, clips: Mapping[str, Any]) -> Batch:
+        """Audio features normalised, and augmented when a key is given; waveforms from -1 to 1.
+
+        Args:
+            clips: raw fields, of :func:`a2g_jax.data.batch.gather_clips`.
+        """
+        audio = clips["audio"]
         if key is not None and self.augmentation > 0:
             keys = jax.random.split(key, audio.shape[0])
             audio = jax.vmap(lambda k, clip: augment_log_mel(k, clip, self.augmentation))(keys, audio)
-        return Batch(self.audio_statistics.normalise(audio), pose, labels[:, 0], labels[:, 1])
+        fields = {**clips, "audio": self.audio_statistics.normalise(audio)}
+        if "waveform" in fields:
+            fields["waveform"] = jnp.asarray(fields["waveform"], jnp.float32) / 32768.0
+        return Batch(**fields)
 
 
 def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " clips"]:

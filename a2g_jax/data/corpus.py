@@ -9,7 +9,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Float, Int16, Int32
+from jaxtyping import Bool, Float, Int16, Int32
 
 from a2g_jax.data.splits import Segment, Splits
 from a2g_jax.errors import InputError
@@ -17,9 +17,11 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS, rotations_from_rows
+from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import read_json
+from a2g_jax.io.transcripts import words_at_frames
+from a2g_jax.io.words import Word, word_id
 
 FORMAT = "a2g_jax corpus"
 #: Of corpora whose recordings are all stored, and of those that leave most of them to be generated in training.
@@ -60,10 +62,8 @@ class Corpus:
     path: Path
     fps: float
     mel: MelConfig
-    body: Skeleton | PoseLayout
-    """What the rows of a pose are: joints of a skeleton, or points and bones."""
-    representation: str
-    """How a pose is written down: a key of :data:`~a2g_jax.geometry.pose_space.WIDTHS`."""
+    space: PoseSpace
+    """The body, and the kind of numbers that its poses are written in."""
     recordings: tuple[Entry, ...]
     splits: Splits
     recipe: dict[str, Any]
@@ -91,13 +91,17 @@ class Corpus:
                 f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION} or"
                 f" {VERSION_ON_DEMAND}; prepare it anew."
             )
+        kind = str(manifest.get("pose", "6d"))
+        if kind not in WIDTHS:
+            raise InputError(
+                f"{path / MANIFEST}: has poses of the unknown kind {kind!r}; the kinds are {', '.join(WIDTHS)}."
+            )
         try:
             corpus = cls(
                 path=path,
                 fps=float(manifest["fps"]),
                 mel=MelConfig(**manifest["mel"]),
-                body=body_from_json(manifest),
-                representation=manifest.get("pose", "6d"),
+                space=PoseSpace(body_from_json(manifest), kind),
                 recordings=tuple(Entry(**entry) for entry in manifest["recordings"]),
                 splits={name: [Segment(*row) for row in rows] for name, rows in manifest["splits"].items()},
                 recipe=manifest["recipe"],
@@ -118,9 +122,7 @@ class Corpus:
             for index, start, stop in segments:
                 if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
                     raise InputError(f"{where}: is damaged ({name} holds {[index, start, stop]}); prepare it anew.")
-        if self.representation not in WIDTHS:
-            raise InputError(f"{where}: tells of poses as {self.representation!r}, which this package does not know.")
-        shapes = {"audio": (self.mel.width,), "pose": (self.rows, WIDTHS[self.representation]), "root": (3,)}
+        shapes = {"audio": (self.mel.width,), "pose": self.space.shape, "root": (3,)}
         for name, statistics in self.statistics.items():
             if not statistics.mean.shape == statistics.std.shape == shapes[name] or not np.all(statistics.std > 0):
                 raise InputError(f"{self.path / 'statistics.npz'}: is damaged ({name}); prepare the corpus anew.")
@@ -156,37 +158,48 @@ class Corpus:
         return read_json(self.path / PARTS) if self.on_demand else {}
 
     @property
+    def body(self) -> Skeleton | PoseLayout:
+        """Rows of a pose: joints of a skeleton, or points and bones."""
+        return self.space.body
+
+    @property
     def skeleton(self) -> Skeleton:
         """The skeleton whose rotations the corpus holds.
 
         Raises:
             InputError: it holds keypoints or directions.
         """
-        if not isinstance(self.body, Skeleton):
-            raise InputError(
-                f"{self.path}: holds {self.representation} and no skeleton; this needs a corpus of rotations"
-                " (prepared with --pose 6d or exponential)."
-            )
-        return self.body
+        self.require_rotations()
+        return self.space.skeleton
 
-    def require_pose(self, *representations: str) -> None:
-        """Refuse to be read as what it is not.
+    def require_rotations(self) -> None:
+        """Refuse a corpus of other poses.
 
         Raises:
-            InputError: the corpus holds poses in none of the representations.
+            InputError: the corpus holds keypoints or directions.
         """
-        if self.representation not in representations:
+        if not self.space.has_rotations:
             raise InputError(
-                f"{self.path}: holds poses as {self.representation}; this needs {' or '.join(representations)}."
-                f" Prepare one with --pose {representations[0]}."
+                f"{self.path}: holds {self.space.noun} and no skeleton; this needs a corpus of rotations (prepared with"
+                " --pose 6d or exponential)."
+            )
+
+    def require_pose(self, *kinds: str) -> None:
+        """Refuse a corpus of other kinds of poses.
+
+        Raises:
+            InputError: the corpus holds poses of none of the kinds.
+        """
+        if self.space.kind not in kinds:
+            raise InputError(
+                f"{self.path}: holds poses as {self.space.kind}; this needs {' or '.join(kinds)}."
+                f" Prepare one with --pose {kinds[0]}."
             )
 
     @property
     def rows(self) -> int:
         """Rows of a pose: joints, bones or points."""
-        if isinstance(self.body, Skeleton):
-            return self.body.joints
-        return len(self.body.names if self.representation == "keypoints" else self.body.bones)
+        return self.space.rows
 
     @cached_property
     def emotions(self) -> tuple[str, ...]:
@@ -222,7 +235,7 @@ class Corpus:
 
     @cached_property
     def pose(self) -> Float[np.ndarray, "N R D"]:
-        """Poses, written down as :attr:`representation` says; in 6D the first two columns of each local rotation."""
+        """Poses in the corpus's :attr:`space`; in 6D the first two columns of each local rotation."""
         return self._array("pose.npy")
 
     @cached_property
@@ -240,6 +253,46 @@ class Corpus:
         if not any(entry.samples for entry in self.recordings):
             raise InputError(f"{self.path}: keeps no waveforms; prepare it with --waveform.")
         return self._array(WAVEFORM)
+
+    def array(self, name: str) -> np.ndarray:
+        """An array that batches are gathered from: a row a frame, and ``waveform`` with a row a sample.
+
+        Args:
+            name: one of :data:`a2g_jax.data.batch.FIELDS`' arrays.
+
+        Raises:
+            InputError: the corpus does not have it, such as words where no recording has a transcript.
+        """
+        if name in ("emotion", "speaker"):
+            return self.labels[:, ("emotion", "speaker").index(name)]
+        if name in ("words", "word_starts"):
+            return self._words[("words", "word_starts").index(name)]
+        if name == "waveform_start":
+            return self._first_samples
+        arrays = {"audio": lambda: self.audio, "pose": lambda: self.pose, "waveform": lambda: self.waveform}
+        return arrays[name]()
+
+    @cached_property
+    def _words(self) -> tuple[Int32[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
+        rows = [
+            word_rows(self.annotations(index).get("words", ()), self.fps, entry.frames)
+            for index, entry in enumerate(self.recordings)
+        ]
+        words, starts = (np.concatenate(part) for part in zip(*rows, strict=True))
+        if not words.any():
+            raise InputError(f"{self.path}: none of its recordings has words; prepare recordings with transcripts.")
+        return words, starts
+
+    @cached_property
+    def _first_samples(self) -> Int32[np.ndarray, " N"]:
+        """Row in the waveform of the first sample of each frame."""
+        step = self.mel.sample_rate / self.fps
+        return np.concatenate(
+            [
+                entry.first_sample + np.round(np.arange(entry.frames) * step).astype(np.int32)
+                for entry in self.recordings
+            ]
+        ).astype(np.int32)
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
@@ -274,9 +327,8 @@ class Corpus:
         Raises:
             InputError: the corpus holds no rotations.
         """
-        self.require_pose("6d", "exponential")
-        rotations = rotations_from_rows(np.asarray(self.pose[start:stop]), self.representation)
-        return Motion(rotations, np.asarray(self.root[start:stop]), self.skeleton, self.fps)
+        self.require_rotations()
+        return self.space.motion(np.asarray(self.pose[start:stop]), self.fps, np.asarray(self.root[start:stop]))
 
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and whatever else is known about a recording; times in seconds."""
@@ -288,6 +340,23 @@ def label_rows(corpus: Corpus, recordings: Sequence[tuple[str, str, int]]) -> In
     each = [(corpus.emotions.index(emotion), corpus.speakers.index(speaker)) for emotion, speaker, _ in recordings]
     table = np.array(each, np.int32).reshape(-1, 2)
     return np.repeat(table, [frames for *_, frames in recordings], axis=0)
+
+
+def word_rows(
+    words: Sequence[dict[str, Any]], fps: float, frames: int
+) -> tuple[Int32[np.ndarray, " T"], Bool[np.ndarray, " T"]]:
+    """Ids of the words that are spoken at each frame, and whether a word starts within it.
+
+    Args:
+        words: annotations, each with ``text``, ``start`` and ``end`` in seconds.
+    """
+    spoken = [Word(word["text"], float(word["start"]), float(word["end"])) for word in words]
+    index = words_at_frames(spoken, fps, frames)
+    ids = np.array([*(word_id(word.text) for word in spoken), 0], np.int32)
+    starts = np.zeros(frames, bool)
+    first = np.array([int(word.start * fps) for word in spoken], np.int64)
+    starts[first[(first >= 0) & (first < frames)]] = True
+    return ids[index], starts
 
 
 def skeleton_to_json(skeleton: Skeleton) -> dict[str, Any]:

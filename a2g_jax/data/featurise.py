@@ -11,8 +11,8 @@ from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.geometry.motion import Motion, resample
-from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack, resample_track
-from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_track import PoseTrack, represent, resample_track
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_skeleton
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 

@@ -22,7 +22,7 @@ from a2g_jax.data.featurise import Prepared, Skipped
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS
+from a2g_jax.geometry.pose_space import WIDTHS, layout_rows
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import make_folder, sha256_file, write_json
 
@@ -249,7 +249,7 @@ class Unfinished:
             rows = self.body.joints
         else:
             assert self.body is not None
-            rows = len(self.body.names if pose == "keypoints" else self.body.bones)
+            rows = layout_rows(self.body, pose)
         shapes: dict[str, tuple[int, ...]] = {"audio.npy": (self._features.mel.width,), "root.npy": (3,), WAVEFORM: ()}
         return {**shapes, "pose.npy": (rows, WIDTHS[pose])}[name]
 

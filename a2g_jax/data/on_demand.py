@@ -16,9 +16,8 @@ from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int32
 
-from a2g_jax.data.corpus import PARTS, Corpus, label_rows
+from a2g_jax.data.corpus import PARTS, Corpus, label_rows, word_rows
 from a2g_jax.data.generated import Role, TalkerOptions, generate_rows
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
@@ -41,10 +40,8 @@ class OnDemand:
 class Part(NamedTuple):
     """Recordings to train on for a while."""
 
-    audio: Float[np.ndarray, "N width"]
-    pose: Float[np.ndarray, "N R D"]
-    labels: Int32[np.ndarray, "N 2"]
-    """Indices of emotion and speaker, as :attr:`Corpus.labels`."""
+    arrays: dict[str, np.ndarray]
+    """By the names of :meth:`Corpus.array`."""
     segments: list[Segment]
     """Stretches within which clips may lie, as rows of the arrays."""
 
@@ -80,15 +77,24 @@ class PartStream:
     memory. An ordinary corpus is one part, and nothing is generated.
     """
 
-    def __init__(self, corpus: Corpus, part_steps: int, total_steps: int, workers: int | None = None) -> None:
+    def __init__(
+        self,
+        corpus: Corpus,
+        part_steps: int,
+        total_steps: int,
+        workers: int | None = None,
+        arrays: tuple[str, ...] = ("audio", "pose", "emotion", "speaker"),
+    ) -> None:
         """
         Args:
+            arrays: names of :meth:`Corpus.array` that parts have.
             part_steps: steps trained on a part before the next one's turn.
             total_steps: of the training; no part is generated for steps after it.
             workers: processes that generate; half of the cores if None.
         """
         self.corpus, self.part_steps, self.total_steps = corpus, part_steps, total_steps
         self.workers = workers or max(1, (os.cpu_count() or 1) // 2)
+        self.arrays = arrays
         self._stack = ExitStack()
         self._pool: ProcessPoolExecutor | None = None
         self._coming: dict[int, list[Future]] = {}
@@ -129,7 +135,7 @@ class PartStream:
             return []
         if number not in self._coming and (self._present is None or self._present[0] != number):
             assert self._pool is not None
-            generate = partial(_generate, **_settings(self.corpus))
+            generate = partial(_generate, arrays=self.arrays, **_settings(self.corpus))
             self._coming[number] = [
                 self._pool.submit(generate, role) for role in self.corpus.later["parts"][number - 1]
             ]
@@ -137,7 +143,7 @@ class PartStream:
 
     def _wait(self, number: int, stop: threading.Event | None) -> Part | None:
         if number == 0:
-            return Part(self.corpus.audio, self.corpus.pose, self.corpus.labels, self.corpus.segments("train"))
+            return Part({name: self.corpus.array(name) for name in self.arrays}, self.corpus.segments("train"))
         futures = self._begin(number)
         while wait(futures, timeout=0.2, return_when="FIRST_EXCEPTION").not_done:
             if any(future.done() and future.exception() for future in futures):
@@ -149,16 +155,20 @@ class PartStream:
         return join_rows(self.corpus, roles, [future.result() for future in futures])
 
 
-def join_rows(corpus: Corpus, roles: list[Role], arrays: list[tuple[np.ndarray, np.ndarray]]) -> Part:
-    """A part of recordings given as their audio and pose rows."""
+def join_rows(corpus: Corpus, roles: list[Role], arrays: list[dict[str, np.ndarray]]) -> Part:
+    """A part of recordings given as the rows of each."""
+    frames = [len(rows["audio"]) for rows in arrays]
+    stops = list(accumulate(frames))
+    segments = [Segment(n, stop - frames[n], stop) for n, stop in enumerate(stops)]
     labels = label_rows(
-        corpus,
-        [(role["emotion"], role["speaker"], len(audio)) for role, (audio, _) in zip(roles, arrays, strict=True)],
+        corpus, [(role["emotion"], role["speaker"], count) for role, count in zip(roles, frames, strict=True)]
     )
-    stops = list(accumulate(len(audio) for audio, _ in arrays))
-    segments = [Segment(n, stop - len(arrays[n][0]), stop) for n, stop in enumerate(stops)]
-    audio, pose = (np.concatenate([each[kind] for each in arrays]) for kind in (0, 1))
-    return Part(audio, pose, labels, segments)
+    joined = {name: np.concatenate([rows[name] for rows in arrays]) for name in arrays[0]}
+    if "waveform" in joined:
+        before = np.cumsum([0, *(len(rows["waveform"]) for rows in arrays[:-1])])
+        shifted = [rows["waveform_start"] + first for rows, first in zip(arrays, before, strict=True)]
+        joined["waveform_start"] = np.concatenate(shifted).astype(np.int32)
+    return Part({**joined, "emotion": labels[:, 0], "speaker": labels[:, 1]}, segments)
 
 
 def check_generator(corpus: Corpus) -> None:
@@ -168,7 +178,8 @@ def check_generator(corpus: Corpus) -> None:
         InputError: it comes out otherwise, so what would be generated does not belong to what is stored.
     """
     entry = corpus.recordings[0]
-    audio, pose = _generate(corpus.later["stored"][0], **_settings(corpus))
+    generated = _generate(corpus.later["stored"][0], arrays=("audio", "pose"), **_settings(corpus))
+    audio, pose = generated["audio"], generated["pose"]
     rows = slice(entry.first, entry.first + entry.frames)
     # Another processor may round differently; another generator is far off.
     same = audio.shape == corpus.audio[rows].shape and pose.shape == corpus.pose[rows].shape
@@ -188,15 +199,24 @@ def _settings(corpus: Corpus) -> dict[str, Any]:
             "jitter": float(options["jitter"]),
             "fingers": bool(options["fingers"]),
             "view": str(options.get("view", "body")),
-            "features": Features(corpus.fps, corpus.mel, corpus.representation, "all"),
+            "features": Features(
+                corpus.fps, corpus.mel, corpus.space.kind, "all", any(entry.samples for entry in corpus.recordings)
+            ),
         }
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{corpus.path / PARTS}: is damaged ({error!r}); prepare the corpus anew.") from None
 
 
 def _generate(
-    role: Role, jitter: float, fingers: bool, view: str, features: Features
-) -> tuple[Float[np.ndarray, "T width"], Float[np.ndarray, "T R D"]]:
-    """Audio and pose rows of a recording; what training does not need stays in the worker."""
+    role: Role, arrays: tuple[str, ...], jitter: float, fingers: bool, view: str, features: Features
+) -> dict[str, np.ndarray]:
+    """Rows of a recording; what training does not need stays in the worker."""
     rows = generate_rows(role, jitter, fingers, view, features)
-    return rows.audio, rows.pose
+    made: dict[str, Any] = {"audio": rows.audio, "pose": rows.pose}
+    if "words" in arrays or "word_starts" in arrays:
+        made["words"], made["word_starts"] = word_rows(rows.annotations["words"], features.fps, len(rows.audio))
+    if "waveform" in arrays:
+        step = features.mel.sample_rate / features.fps
+        made["waveform"] = rows.waveform
+        made["waveform_start"] = np.round(np.arange(len(rows.audio)) * step).astype(np.int32)
+    return {name: made[name] for name in made if name in (*arrays, "audio", "pose")}

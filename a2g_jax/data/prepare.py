@@ -17,6 +17,7 @@ from a2g_jax.data.on_demand import OnDemand, split_roles
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_space import interchangeable
 from a2g_jax.progress import progress_bar, say
 from a2g_jax.talker.views.catalogue import find_view
 
@@ -61,7 +62,7 @@ def prepare_talker(
 def view_poses(view: str) -> tuple[str, ...]:
     """How the poses of a view of the talker can be written down, the usual way first."""
     pose = find_view(view).pose
-    return ("6d", "exponential") if pose == "6d" else (pose,)
+    return interchangeable(pose)
 
 
 def prepare_data_set(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_layout import PoseTrack
+from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.words import Word as Word
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
 from a2g_jax.talker.recordings import resample_motion, talk
 

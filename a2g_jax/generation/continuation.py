@@ -1,7 +1,7 @@
 """Clips continued from their own first poses, as the flow paper's protocols score them (Sec. 4.1).
 
-Of a clip the first poses are given (12 frames on TED, 5 on Trinity) and those up to its lookahead are made. Models that
-take no first poses hear the same clip, and their frames at the same place are taken.
+Of a clip the first poses are given (12 frames on TED, 5 on Trinity), and the following ones up to its lookahead are
+generated. Models without seed poses generate the whole clip, and the frames at the same place are taken.
 """
 
 from typing import Any
@@ -11,13 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.generation.engine import valid_rows
-from a2g_jax.models.stylized_flow.model import draw_latents
-from a2g_jax.models.stylized_flow.networks import FlowNetworks
-from a2g_jax.nn.noise import BLOCK
+from a2g_jax.models.base import Condition, Model
+from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 
-#: Clips worked on at once.
+#: Clips of one call.
 _CHUNK = 16
 
 
@@ -36,16 +34,16 @@ def continue_clips(
 
     Args:
         audio: features as a corpus holds them, not normalised.
-        pose: of which a flow is given the ``history_frames`` before ``first``; other models none.
-        first: number of the first frame that is made; for a flow, at least its history.
-        last: one behind the last; for a flow, at most T less its lookahead.
+        pose: seed poses are the last ones before ``first``, for models that take any.
+        first: number of the first frame that is generated; at least the model's number of seed poses.
+        last: one behind the last; for autoregressive models, at most T less their lookahead.
 
     Raises:
-        ValueError: a flow whose history or lookahead leave the clip.
+        ValueError: seed poses or lookahead that leave the clip.
     """
-    config = run.config
-    heard = np.asarray(config.statistics["audio"].normalise(audio), np.float32)
-    draw = _flow(run, first, last, audio.shape[1]) if config.model == "stylized_flow" else _other(run, first, last)
+    config, model = run.config, run.config.build()
+    normalised = np.asarray(config.statistics["audio"].normalise(audio), np.float32)
+    draw = jax.jit((_autoregressive if model.begin is not None else _whole)(run, model, first, last, audio.shape[1]))
     key = jax.random.key(seed)
     clip_keys = jax.vmap(lambda clip: jax.random.fold_in(key, clip))(jnp.arange(len(audio)))
     keys = jax.vmap(lambda one: jax.vmap(lambda k: jax.random.fold_in(one, k))(jnp.arange(samples)))(clip_keys)
@@ -54,60 +52,57 @@ def continue_clips(
     for start in range(0, len(audio), _CHUNK):
         # The last chunk is filled up, so that one compiled program serves all.
         rows = np.minimum(np.arange(start, start + _CHUNK), len(audio) - 1)
-        poses = draw(params, summary, keys[rows], heard[rows], pose[rows])
+        poses = draw(params, summary, keys[rows], normalised[rows], pose[rows])
         made.append(np.asarray(poses)[: len(audio) - start])
     return np.concatenate(made)
 
 
-def _flow(run: Run, first: int, last: int, frames: int) -> Any:
-    """Of a flow: the frames one after another, all clips and samples side by side."""
-    config, networks = run.config, FlowNetworks(run.config.model_config, run.config.data())
-    model = config.build()
-    history, lookahead = config.model_config.history_frames, config.model_config.lookahead_frames
+def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
+    """The frames one after another, all clips and samples side by side."""
+    history, lookahead = model.seed_frames, model.lookahead
     if first < history or last > frames - lookahead:
         raise ValueError(
             f"expected frames from {history} to {frames - lookahead} of clips of {frames}; got {first} to {last}"
         )
-    assert model.condition is not None
-    condition = model.condition
+    condition, begin, proceed, space = model.condition, model.begin, model.proceed, run.config.space
+    assert condition is not None
+    assert begin is not None
+    assert proceed is not None
 
-    @jax.jit
     def draw(params, summary, keys, audio, pose):
-        del summary
+        del summary  # of its range of poses, to which generation of minutes keeps
 
         def one_clip(keys, audio, pose):
-            heard = jax.tree.map(lambda array: array[first:last], condition(params, audio))
-            seeds = networks.flat(pose[None, first - history : first])[0]
-            z = jax.vmap(
-                lambda key: draw_latents(config.model_config, key, jnp.int32(0), last - first, networks.channels)
-            )(keys)
-            carried = networks.start(params, len(keys), seeds)
-            flat, _ = networks.proceed(params, jnp.swapaxes(z, 0, 1), heard, carried)
-            return valid_rows(networks.pose(jnp.swapaxes(flat, 0, 1)), config.representation)
+            given = jax.tree.map(lambda array: array[first:last], condition(params, {}, Condition(audio)))
+            seeds = pose[first - history : first]
+
+            def one(key):
+                state = begin(params, {}, key, seeds)
+                return proceed(params, {}, key, given, jnp.int32(0), state)[0]
+
+            return space.valid(jax.vmap(one)(keys))
 
         return jax.vmap(one_clip)(keys, audio, pose)
 
     return draw
 
 
-def _other(run: Run, first: int, last: int) -> Any:
-    """Of a model without first poses: the frames of a motion for the whole clip."""
-    config = run.config
-    model = config.build()
-    assert model.condition is not None
-    assert model.sample is not None
-    condition, sample = model.condition, model.sample
+def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
+    """The frames of a motion for the whole clip."""
+    del frames
+    condition, sample, space = model.condition, model.sample, run.config.space
+    assert condition is not None
+    assert sample is not None
 
-    @jax.jit
     def draw(params, summary, keys, audio, pose):
         del pose
-        # Noise is drawn in blocks; behind a clip lies what is quietest in it.
+        # Noise is drawn in blocks; after a clip the audio is as quiet as its quietest frame.
         padded = jnp.pad(audio, ((0, 0), (0, -audio.shape[1] % BLOCK), (0, 0)), mode="minimum")
 
         def one_clip(keys, audio):
-            heard = condition(params, audio)
-            return jax.vmap(lambda key: sample(params, summary, key, heard, jnp.int32(0))[first:last])(keys)
+            given = condition(params, summary, Condition(audio))
+            return jax.vmap(lambda key: sample(params, summary, key, given, jnp.int32(0))[first:last])(keys)
 
-        return valid_rows(jax.vmap(one_clip)(keys, padded), config.representation)
+        return space.valid(jax.vmap(one_clip)(keys, padded))
 
     return draw

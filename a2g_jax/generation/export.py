@@ -1,119 +1,70 @@
-"""Generated motions as files: BVH, NPZ and a page to look at."""
+"""Generated motions as files, and a page to watch them on."""
 
 import os
-import re
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.recording import Word
-from a2g_jax.errors import InputError
-from a2g_jax.generation.audio2gestures.pinned import Pins
-from a2g_jax.generation.engine import Generator
-from a2g_jax.generation.stylized_flow.styled import Styling
-from a2g_jax.io.bvh import write_bvh
-from a2g_jax.io.files import make_folder, write_json
-from a2g_jax.io.npz import write_motion_npz
+from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
+from a2g_jax.generation.generator import Sampler, audio_frames
+from a2g_jax.io.words import Word
 from a2g_jax.training.run import Run
-
-FORMATS = ("bvh", "npz", "html")
-#: Most joint positions that a page may hold: about 200 MB of HTML.
-_PAGE_LIMIT = 20_000_000
+from a2g_jax.viz.player import Figure, Track, write_page
 
 
-def check_formats(text: str) -> tuple[str, ...]:
-    """The formats in a comma-separated list.
-
-    Raises:
-        InputError: none, or one that is not known.
-    """
-    formats = tuple(part.strip().lower() for part in text.split(",") if part.strip())
-    for name in formats:
-        if name not in FORMATS:
-            raise InputError(f"--formats: no format {name!r}; there are: {', '.join(FORMATS)}.")
-    if not formats:
-        raise InputError(f"--formats: name at least one of {', '.join(FORMATS)}.")
-    return formats
-
-
-def deliver(
+def export(
     run: Run,
+    sampler: Sampler,
     audio: Float[np.ndarray, " N"],
     out: str | os.PathLike[str],
     *,
     samples: int,
     seed: int,
-    formats: str,
+    formats: Sequence[str],
     title: str,
+    label: str = "",
     words: Sequence[Word] = (),
-    pins: Pins | None = None,
-    styling: Styling | None = None,
+    lanes: Sequence[Track] = (),
+    others: str = "",
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
-    """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``; with pins also ``pins.json``.
+    """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``.
 
     Args:
+        run: what the sampler generates with.
         audio: mono, at the run's sample rate.
-        formats: comma-separated; see :func:`check_formats`.
-        title: what was spoken, for the page's heading.
-        pins: clips that are pinned to moments of every sample; not with ``styling``.
-        styling: clips whose style every sample takes on, or that it goes on from.
+        formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
+        title: name of the speech, for the page's heading.
+        label: further words on the sampler, for the page's subtitle.
+        lanes: further tracks of the page's timeline.
+        others: a regular expression for further files of the folder that are replaced.
         report: called with the number of samples done.
 
     Returns:
         How many files of each format were written.
 
     Raises:
-        InputError: unknown format, a folder that cannot be used, audio shorter than a frame, too large a page, or clips
-            that cannot be used.
+        InputError: a folder that cannot be used, audio shorter than a frame, or too large a page.
     """
-    from a2g_jax.viz.player import Figure, write_page
-
-    kinds = check_formats(formats)
-    generator = Generator(run)
-    pinned = None if pins is None else pins.place(run, generator.frames(audio))
-    styled = None if styling is None else styling.place(run, samples)
-    frames, joints = generator.frames(audio), run.config.skeleton.joints
-    if "html" in kinds and samples * frames * joints > _PAGE_LIMIT:
-        raise InputError(
-            f"a page of {samples} motions of {frames} frames would be too large for a browser;"
-            " ask for fewer --samples, or for --formats bvh,npz."
-        )
-    out = make_folder(out)
-    # What an earlier run left here would stand beside motions for another speech.
-    for old in (*out.glob("sample_*.bvh"), *out.glob("sample_*.npz"), *out.glob("index.html"), *out.glob("pins.json")):
-        if re.fullmatch(r"sample_\d+\.(bvh|npz)|index\.html|pins\.json", old.name):
-            old.unlink()
-    figures: list[Figure] = []
-    followed: list[list[dict[str, Any]]] = []
-    if styled is not None:
-        motions = styled.stream(audio, samples, seed)
-    elif pinned is not None:
-        motions = pinned.stream(audio, samples, seed, followed)
-    else:
-        motions = generator.stream(audio, samples, seed)
-    for number, motion in enumerate(motions):
-        if "bvh" in kinds:
-            write_bvh(out / f"sample_{number:02d}.bvh", motion)
-        if "npz" in kinds:
-            write_motion_npz(out / f"sample_{number:02d}.npz", motion)
-        if "html" in kinds:
+    if PAGE in formats:
+        check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
+    files, figures = MotionFiles(out, "sample", formats, others), []
+    for number, motion in enumerate(sampler.stream(audio, samples, seed)):
+        files.write(number, motion)
+        if PAGE in formats:
             figures.append(Figure(motion=motion, label=f"sample {number}"))
         report(number + 1)
-    if pinned is not None:
-        write_json(out / "pins.json", followed)
     if figures:
         write_page(
-            out / "index.html",
+            files.folder / "index.html",
             figures,
             audio,
             run.config.mel.sample_rate,
             title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
             subtitle=f"{run.config.model}, {run.config.preset} preset, {run.steps} training steps, seed {seed}"
-            + ("" if styling is None else f", {styling.label}"),
+            + (f", {label}" if label else ""),
             words=words,
-            lanes=() if pinned is None else (pinned.lane(),),
+            lanes=lanes,
         )
-    return {kind: 1 if kind == "html" else samples for kind in kinds}
+    return {kind: 1 if kind == PAGE else samples for kind in formats}

@@ -1,57 +1,277 @@
-"""How a corpus writes down a pose: rotations of joints, directions of bones, or keypoints."""
+"""The meaning of a pose's numbers: rotations of joints, directions of bones, or keypoints.
+
+The only module that compares the kinds of poses by name. Everything else asks a :class:`PoseSpace`.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack
-from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d, matrix_from_axis_angle
-from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
+from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 
 #: Values of each joint, bone or point. 6d: the first two columns of a local rotation matrix (Zhou et al. 2019);
 #: exponential: axis times angle of a local rotation, radians, at most pi; directions: a unit vector from parent to
-#: child; keypoints: where a point is in the image.
+#: child; keypoints: the place of a point in the image.
 WIDTHS = {"6d": 6, "exponential": 3, "directions": 3, "keypoints": 2}
+#: Names of the rows of a pose, for messages.
+_NOUNS = {"6d": "joints", "exponential": "joints", "directions": "bone directions", "keypoints": "keypoints"}
 
-_exponential = jax.jit(axis_angle_from_matrix)
-_rotations = jax.jit(matrix_from_axis_angle)
+
+@dataclass(frozen=True, eq=False)
+class PoseSpace:
+    """A body and the kind of numbers that its poses are written in."""
+
+    body: Skeleton | PoseLayout
+    """Rows of a pose: joints of a skeleton, or points and bones."""
+    kind: str = "6d"
+    """A key of :data:`WIDTHS`."""
+
+    def __post_init__(self) -> None:
+        """Refuse a kind that does not exist, and rotations without a skeleton."""
+        if self.kind not in WIDTHS:
+            raise InputError(f"poses: there is no kind {self.kind!r}; there are: {', '.join(WIDTHS)}.")
+        if self.has_rotations != isinstance(self.body, Skeleton):
+            raise ValueError(f"expected a skeleton for rotations, and a layout otherwise; got {self.kind}")
+
+    @property
+    def rows(self) -> int:
+        """Rows of a pose: joints, bones or points."""
+        if isinstance(self.body, Skeleton):
+            return self.body.joints
+        return layout_rows(self.body, self.kind)
+
+    @property
+    def width(self) -> int:
+        """Values of a row."""
+        return WIDTHS[self.kind]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Shape of a pose."""
+        return self.rows, self.width
+
+    @property
+    def noun(self) -> str:
+        """Name of the rows, for messages."""
+        return _NOUNS[self.kind]
+
+    @property
+    def has_rotations(self) -> bool:
+        """Whether poses are rotations of a skeleton's joints."""
+        return self.kind in ("6d", "exponential")
+
+    @property
+    def unit_scale(self) -> bool:
+        """Whether values are of order one by construction, so that networks may take them without normalisation."""
+        return self.kind == "6d"
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton whose rotations poses are.
+
+        Raises:
+            InputError: poses are keypoints or directions.
+        """
+        if not isinstance(self.body, Skeleton):
+            raise InputError(f"poses are {self.noun}, which have no skeleton; this needs --pose 6d or exponential.")
+        return self.body
+
+    def same_as(self, other: "PoseSpace") -> bool:
+        """Whether both have the same kind of poses on the same joints, points or bones, whatever their lengths."""
+        if self.kind != other.kind:
+            return False
+        if isinstance(self.body, Skeleton) and isinstance(other.body, Skeleton):
+            return self.body.same_tree(other.body)
+        return self.body.names == other.body.names
+
+    def rotations(self, pose: Float[Array, "*S R D"]) -> Float[Array, "*S R 3 3"] | None:
+        """Local rotation matrices; None where poses are no rotations."""
+        if not self.has_rotations:
+            return None
+        return matrix_from_6d(pose) if self.kind == "6d" else matrix_from_axis_angle(pose)
+
+    def from_rotations(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R D"]:
+        """Poses of local rotation matrices.
+
+        Raises:
+            InputError: poses are keypoints or directions.
+        """
+        if not self.has_rotations:
+            raise InputError(f"poses are {self.noun}; rotations cannot be written as these.")
+        return matrix_to_6d(rotations) if self.kind == "6d" else axis_angle_from_matrix(rotations)
+
+    def joint_positions(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R 3"]:
+        """Joint positions of local rotations in metres, the root at the origin."""
+        return joint_positions(rotations, jnp.asarray(self.skeleton.offsets), self.skeleton.parents)
+
+    def valid(
+        self, pose: Float[Array, "*S R D"], rotations: Float[Array, "*S R 3 3"] | None = None
+    ) -> Float[Array, "*S R D"]:
+        """The pose that a network's raw output stands for: orthonormal 6D, directions of length 1, others as given.
+
+        Args:
+            rotations: of the pose, where they have been computed before.
+        """
+        if self.kind == "6d":
+            return matrix_to_6d(matrix_from_6d(pose) if rotations is None else rotations)
+        if self.kind == "directions":
+            return pose / jnp.maximum(jnp.linalg.norm(pose, axis=-1, keepdims=True), 1e-6)
+        return pose
+
+    @property
+    def metres(self) -> bool:
+        """Whether positions are metres; otherwise they are in the corpus's own unit."""
+        return self.has_rotations or bool(self.kind == "directions" and self.body.lengths)  # type: ignore[union-attr]
+
+    @property
+    def unit(self) -> str:
+        """Unit of distances in a report."""
+        return "cm" if self.metres else "units"
+
+    @property
+    def scale(self) -> float:
+        """Factor from positions to :attr:`unit`."""
+        return 100.0 if self.metres else 1.0
+
+    def read(self, pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, "T R 3 3"] | None:
+        """:meth:`rotations`, compiled, as a NumPy array."""
+        return np.asarray(_rotations(jnp.asarray(pose), _Kind(self))) if self.has_rotations else None
+
+    def positions(self, pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, "T P _"]:
+        """Positions of the points of a pose, compiled, as a NumPy array.
+
+        Joints in metres with the root at the origin; bones laid end to end in metres, or their directions where their
+        lengths are not known; keypoints as they are.
+        """
+        if isinstance(self.body, Skeleton):
+            return np.asarray(_positions(pose, np.asarray(self.body.offsets, np.float32), _Kind(self)))
+        if not self.metres:
+            return np.asarray(pose)
+        places = np.zeros((len(pose), len(self.body.names), 3), np.float32)
+        for (start, end), length, way in zip(self.body.bones, self.body.lengths, np.swapaxes(pose, 0, 1), strict=True):
+            places[:, end] = places[:, start] + length * way
+        return places
+
+    def wrist_rows(self) -> tuple[int, ...] | None:
+        """Joints of the left and right wrist; None where they are not found."""
+        body = find_body(self.body) if isinstance(self.body, Skeleton) else None
+        return None if body is None else tuple(body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR")
+
+    def wrists(self, positions: Float[np.ndarray, "T P _"]) -> Float[np.ndarray, "T w _"]:
+        """Positions of both wrists, or of every point where wrists are not found."""
+        rows = self.wrist_rows()
+        return positions if rows is None else positions[:, list(rows)]
+
+    def motion(
+        self, pose: Float[np.ndarray, "T R D"], fps: float, root: Float[np.ndarray, "T 3"] | None = None
+    ) -> Motion:
+        """A motion of the skeleton, its root at the origin if not given.
+
+        Raises:
+            InputError: poses are keypoints or directions.
+        """
+        skeleton = self.skeleton
+        rotations = rotations_from_rows(pose, self.kind)
+        return Motion(rotations, np.zeros((len(rotations), 3), np.float32) if root is None else root, skeleton, fps)
+
+    def mean_rotations(self, mean: Float[Any, "R D"]) -> Float[np.ndarray, "R 3 3"]:
+        """Rotations of one pose, such as the mean of a corpus.
+
+        Raises:
+            InputError: poses are keypoints or directions.
+        """
+        _ = self.skeleton
+        return rotations_from_rows(np.asarray(mean)[None], self.kind)[0]
 
 
-def represent(
-    motion: Motion | PoseTrack, pose: str, where: str
-) -> tuple[Float[np.ndarray, "T R D"], Skeleton | PoseLayout]:
-    """Values of a motion, and what their rows are: joints of a skeleton, or points and bones.
+class _Kind:
+    """The static part of a pose space: one compilation for all spaces of one kind on one tree."""
+
+    def __init__(self, space: PoseSpace) -> None:
+        self.space = space
+        self._key = (space.kind, space.body.parents if isinstance(space.body, Skeleton) else ())
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Kind) and self._key == other._key
+
+
+@partial(jax.jit, static_argnums=1)
+def _rotations(pose, kind: _Kind):
+    return kind.space.rotations(pose)
+
+
+@partial(jax.jit, static_argnums=2)
+def _positions(pose, offsets, kind: _Kind):
+    return joint_positions(kind.space.rotations(jnp.asarray(pose)), offsets, kind.space.skeleton.parents)
+
+
+def layout_rows(layout: PoseLayout, kind: str) -> int:
+    """Rows of a pose without a skeleton: points for keypoints, bones for directions."""
+    return len(layout.names if kind == "keypoints" else layout.bones)
+
+
+def unit_vectors(values: Float[np.ndarray, "T R D"], kind: str, fallback: Float[np.ndarray, "T R D"]):
+    """Interpolated values made valid again: directions of length 1, keypoints as they are.
 
     Args:
-        pose: a key of :data:`WIDTHS`.
+        fallback: values where an interpolated direction has no length.
+    """
+    if kind != "directions":
+        return values
+    length = np.linalg.norm(values, axis=-1, keepdims=True)
+    return np.where(length > 1e-6, values / np.maximum(length, 1e-6), fallback)
+
+
+def interchangeable(kind: str) -> tuple[str, ...]:
+    """The kinds that a recording of one kind can be written in without loss; the kind itself first."""
+    return ("6d", "exponential") if kind == "6d" else (kind,)
+
+
+def write_motion(motion: Motion, kind: str, where: str) -> tuple[Float[np.ndarray, "T R D"], Skeleton | PoseLayout]:
+    """Poses of a motion, and the body that their rows are of.
+
+    Args:
+        kind: a key of :data:`WIDTHS`.
         where: the recording, for the error.
 
     Raises:
-        InputError: such a motion does not tell such values.
+        InputError: keypoints, which a motion has none of.
     """
-    if isinstance(motion, PoseTrack):
-        if motion.kind != pose:
-            raise InputError(f"{where}: holds {motion.kind}; prepare it with --pose {motion.kind}.")
-        return np.asarray(motion.values, np.float32), motion.layout
-    if pose == "directions":
+    if kind == "directions":
         return _directions(motion)
     rotations = np.asarray(motion.rotations, np.float32)
-    if pose == "6d":
+    if kind == "6d":
         return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6), motion.skeleton
-    if pose == "exponential":
+    if kind == "exponential":
         return np.asarray(_exponential(rotations)), motion.skeleton
     raise InputError(f"{where}: holds rotations of joints; prepare it with --pose 6d, exponential or directions.")
 
 
-def rotations_from_rows(values: Float[np.ndarray, "T J D"], pose: str) -> Float[np.ndarray, "T J 3 3"]:
-    """Rotation matrices of rows in a representation that tells rotations (``"6d"`` or ``"exponential"``)."""
-    return np.asarray(matrix_from_6d(values) if pose == "6d" else _rotations(values))
+def rotations_from_rows(values: Float[np.ndarray, "T J D"], kind: str) -> Float[np.ndarray, "T J 3 3"]:
+    """Rotation matrices of poses that are rotations."""
+    return np.asarray(matrix_from_6d(values) if kind == "6d" else _matrices(values))
+
+
+_exponential = jax.jit(axis_angle_from_matrix)
+_matrices = jax.jit(matrix_from_axis_angle)
 
 
 def _directions(motion: Motion) -> tuple[Float[np.ndarray, "T B 3"], PoseLayout]:
-    """The way from every joint's parent to it, in the world; joints that coincide with their parent are left out."""
+    """World directions from every joint's parent to the joint; joints that coincide with their parent are left out."""
     skeleton = motion.skeleton
     lengths = np.linalg.norm(np.asarray(skeleton.offsets), axis=-1)
     children = [joint for joint, parent in enumerate(skeleton.parents) if parent >= 0 and lengths[joint] > 1e-4]

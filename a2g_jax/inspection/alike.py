@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt32
 
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_layout import PoseTrack
+from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.inspection.finding import Finding, Place
 
 #: Words a second, of audio and of motion.

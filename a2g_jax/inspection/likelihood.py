@@ -18,7 +18,8 @@ from a2g_jax.evaluation.likelihood import compiled_score
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.audio2gestures.pins import face, read_on_skeleton
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import represent, rotations_from_rows
+from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_track import represent
 from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.unlikely import Moment, robust_scale, unlikely_moments

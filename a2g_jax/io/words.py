@@ -1,5 +1,6 @@
 """Spoken words with their times."""
 
+import zlib
 from dataclasses import dataclass
 
 
@@ -10,3 +11,11 @@ class Word:
     text: str
     start: float
     end: float
+
+
+def word_id(text: str) -> int:
+    """A number from 1 to 2**31 - 1 that stands for a word in models: a hash that ignores case and spaces around it.
+
+    It is the same in every corpus, so that words of new speech need no vocabulary.
+    """
+    return zlib.crc32(text.strip().casefold().encode()) % (2**31 - 1) + 1

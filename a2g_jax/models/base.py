@@ -1,51 +1,141 @@
-"""The few questions that every model answers; the trainer and the generator know nothing else about it."""
+"""The interface of every model: what it needs, what it can do, and how it is trained.
+
+The trainer, the generator and the evaluation use nothing else of a model. A capability that a model lacks is None.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from jaxtyping import Array, Float
+import optax
+from jaxtyping import Array, Float, Int
 
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.geometry.pose_space import PoseSpace
+from a2g_jax.models.train_config import TrainConfig
 
-#: A pytree of arrays.
+#: A pytree of arrays whose outermost level is a dictionary of subtrees by name.
 Params = Any
 #: What a model keeps about its latent space after training, for sampling: a dictionary of arrays.
 Summary = dict[str, Any]
+#: ``loss(params, key, batch, step) -> (scalar, named terms)``; the step counts from the beginning of the stage.
+Loss = Callable[..., tuple[Array, dict[str, Array]]]
 
 
 class Data(NamedTuple):
-    """What a model is built for: everything about a corpus that is not a recording."""
+    """The properties of a corpus that a model is built for."""
 
-    body: Skeleton | PoseLayout
-    """What the rows of a pose are."""
+    space: PoseSpace
+    """The body, and the kind of numbers that its poses are written in."""
     fps: float
     audio_bands: int
     pose_statistics: Statistics
     """Over the training split; each (R, D)."""
-    representation: str = "6d"
-    """How a pose is written down: see :mod:`a2g_jax.geometry.pose_space`."""
     emotions: tuple[str, ...] = ()
-    """Of the corpus, in the order of their indices."""
+    """Emotions of the corpus, in the order of their indices."""
     speakers: tuple[str, ...] = ()
-    """Of the corpus, in the order of their indices."""
+    """Speakers of the corpus, in the order of their indices."""
     perceptual: Callable[[Float[Array, "B T R D"]], list[Array]] | None = None
-    """Features of poses, block by block, of a frozen feature network; for perceptual losses."""
+    """Features of poses, block by block, of a frozen feature network; for perceptual losses, in training alone."""
+    sample_rate: int = 16000
+    """Of waveforms, Hz."""
 
-    @property
-    def skeleton(self) -> Skeleton:
-        """The skeleton, where poses are its rotations."""
-        if not isinstance(self.body, Skeleton):
-            raise ValueError(f"poses are {self.representation}, which have no skeleton")
-        return self.body
+
+class Latents(NamedTuple):
+    """Latents in place of drawn ones: ``mean_t + scale_t * drawn_t``."""
+
+    mean: Float[Array, "T C"]
+    scale: Float[Array, "T C"]
+
+
+class Condition(NamedTuple):
+    """Conditioning of T frames; the fields that a model does not declare in ``condition_fields`` are None."""
+
+    audio: Float[Array, "T bands"]
+    """Normalised audio features."""
+    waveform: Float[Array, " samples"] | None = None
+    """Samples from -1 to 1 of these frames, ``round(T * sample_rate / fps)``."""
+    emotion: Float[Array, "T E"] | None = None
+    """Weight of each of :attr:`Data.emotions`; rows sum to 1."""
+    speaker: Int[Array, ""] | None = None
+    """Index into :attr:`Data.speakers`."""
+    words: Int[Array, " T"] | None = None
+    """Id of the word that is spoken at each frame (:func:`a2g_jax.io.words.word_id`); 0 where there is none."""
+    seed_poses: Float[Array, "S R D"] | None = None
+    """Poses before the first frame of the motion, not normalised; of the whole motion, not of a window."""
+    controls: Float[Array, "T K"] | None = None
+    """Requested value of each of :attr:`Model.controls`, in percentiles of the training clips."""
+    latents: Latents | None = None
+    """Of models with :attr:`Model.encode`: latents in place of drawn ones."""
+
+
+class Update(NamedTuple):
+    """One gradient step within a training step: a loss, and the part of the parameters that descends it."""
+
+    loss: Loss
+    trains: tuple[str, ...] = ()
+    """Top-level names of the parameters that are updated; all of them if empty. The others are constants."""
+    name: str = "main"
+    optimiser: Callable[[TrainConfig], optax.GradientTransformation] | None = None
+    """Made of the stage's settings; None for the common one: see :func:`a2g_jax.models.optimiser.make_optimiser`."""
+
+
+class Stage(NamedTuple):
+    """A phase of training. Parameters that no update trains are frozen.
+
+    The updates of a step follow one another, each with its own optimiser and clipping: the second is computed at the
+    parameters that the first one left. A GAN is two updates, discriminator and generator; a network on top of a frozen
+    one is a second stage.
+    """
+
+    updates: tuple[Update, ...]
+    name: str = "main"
+    steps: int | None = None
+    """Training steps; None for those of the training's settings. At most one stage may leave them open."""
+    validation_loss: Loss | None = None
+    """The loss on held-out clips, where that differs (no dropout); otherwise the sum of the updates' losses."""
+    warm_start: Callable[..., Params] | None = None
+    """``warm_start(params, batch) -> params``, once, with the first batch of the stage: initialisation from data."""
+
+
+class Density(NamedTuple):
+    """The capability of models that give the likelihood of a motion."""
+
+    log_likelihood: Callable[..., Array]
+    """``log_likelihood(params, audio (B, T, bands), pose (B, T, R, D), clean=None) -> (B, N)``.
+
+    Nats of each of the N frames that have the whole conditioning around them, given the poses before it and the audio,
+    as a density of z-scores; with the treatment of noise that the model documents. The first of these frames is number
+    ``history``, and ``lookahead`` frames follow the last. ``clean`` is the poses before noise was added to them, if it
+    was: what is measured on poses is measured on those.
+    """
+    conditioning: Callable[..., tuple[Array, Array]]
+    """``conditioning(audio, pose, clean) -> ((B, N, D), (B, N, C))``: everything that these frames are conditioned on,
+    without parameters, and their z-scores."""
+    history: int
+    lookahead: int
+    noise: float
+    """Standard deviation of the noise on training poses, z-scores; 0 for none."""
+
+
+class Classifier(NamedTuple):
+    """The capability of models that classify clips by :attr:`Data.emotions`."""
+
+    logits: Callable[..., Array]
+    """``logits(params, batch) -> (B, K)``"""
+    input: str
+    """``"motion"`` or ``"audio"``."""
+
+
+class Controls(NamedTuple):
+    """The capability of models whose motion is conditioned on measured properties of it."""
+
+    names: tuple[str, ...]
+    measure: Callable[..., Array]
+    """``measure(pose (B, T, R, D)) -> (B, T, K)``"""
 
 
 class Model(NamedTuple):
-    """A model as a record of pure functions; parameters and keys go in, arrays come out.
-
-    Models that measure instead of generating have no ``condition`` and ``sample``; classifiers no ``reconstruct``.
-    """
+    """A model as a record of pure functions; parameters and keys go in, arrays come out."""
 
     name: str
     config: Any
@@ -55,36 +145,47 @@ class Model(NamedTuple):
     """Frames of context on either side that an output frame may depend on."""
     init: Callable[..., Params]
     """``init(key) -> params``"""
-    loss: Callable[..., tuple[Array, dict[str, Array]]]
-    """``loss(params, key, batch, step) -> (scalar, named terms)``"""
+    stages: tuple[Stage, ...]
+    """Of the training, one after another."""
     summarise: Callable[..., Summary]
     """``summarise(params, key, batch) -> arrays with a leading clip axis``, collected over the training split."""
-    condition: Callable[..., Any] | None
-    """``condition(params, audio (T, bands)) -> pytree``: what the samples for one audio share."""
-    sample: Callable[..., Array] | None
-    """``sample(params, summary, key, condition, start) -> pose (T, J, 6)``.
+    batch_fields: tuple[str, ...] = ("audio", "pose")
+    """Fields of :class:`a2g_jax.data.batch.Batch` that training needs."""
+    needs_perceptual: bool = False
+    """Whether a loss needs :attr:`Data.perceptual`."""
+
+    condition: Callable[..., Any] | None = None
+    """``condition(params, summary, Condition of a window) -> pytree``: what all samples for one audio share."""
+    condition_fields: tuple[str, ...] = ("audio",)
+    """Fields of :class:`Condition` that ``condition`` and ``begin`` can use."""
+    sample: Callable[..., Array] | None = None
+    """``sample(params, summary, key, condition, start) -> pose (T, R, D)``.
 
     ``start`` is the frame at which the window begins in the whole audio, a multiple of 128: randomness is a function
     of the key and the absolute frame, so any cutting into windows gives the same motion.
     """
-    reconstruct: Callable[..., Array] | None
-    """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""
-    validation_loss: Callable[..., tuple[Array, dict[str, Array]]] | None = None
-    """``loss`` as it is taken on held-out clips, where that differs (no dropout)."""
-    warm_start: Callable[..., Params] | None = None
-    """``warm_start(params, batch) -> params``, once, with the first batch of a training: initialisation from data."""
     begin: Callable[..., Any] | None = None
-    """Of models whose frames depend on those before: ``begin(params, summary, key) -> carried``, before frame 0."""
+    """Of autoregressive models: ``begin(params, summary, key, seed_poses) -> state`` before frame 0.
+
+    ``seed_poses`` (S, R, D) are the last poses before it, or None for the model's own start.
+    """
     proceed: Callable[..., tuple[Array, Any]] | None = None
-    """``proceed(params, summary, key, condition, start, carried) -> (pose (T, R, D), carried)``: the next T frames.
+    """``proceed(params, summary, key, condition, start, state) -> (pose (T, R, D), state)``: the next T frames.
 
-    Such a model's condition has time as the leading axis of every array. ``sample`` is ``proceed`` after ``begin``.
+    Every array of such a model's condition has time as its leading axis. ``sample`` is ``proceed`` after ``begin``.
     """
-    score: Callable[..., Array] | None = None
-    """Of models that tell densities: ``score(params, audio (B, T, bands), pose (B, T, R, D), clean=None) -> (B, N)``.
+    seed_frames: int = 0
+    """Poses S that ``begin`` takes."""
+    lookahead: int = 0
+    """Frames of audio after its own that a frame of an autoregressive model depends on."""
+    controls: Controls | None = None
 
-    Log-likelihood in nats of each of the N frames that have all they are told of around them, given the poses before
-    it and the audio, as a density of z-scores; with the treatment of noise that the model documents. The first scored
-    frame is ``history_frames`` of the model's settings, and after the last there are ``lookahead_frames``. ``clean`` is
-    the poses before noise was added to them, if it was: what is measured on poses is measured on those.
-    """
+    reconstruct: Callable[..., Array] | None = None
+    """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""
+    encode: Callable[..., Array] | None = None
+    """``encode(params, audio (T, bands), pose (T, R, D), controls (T, K)) -> (N, C)``: latents of the frames of a clip
+    that have ``seed_frames`` before them and ``lookahead`` after them, which :attr:`Condition.latents` can replay."""
+    features: Callable[..., list[Array]] | None = None
+    """``features(params, pose (B, T, R, D)) -> blocks (B, T, width)``: for perceptual losses and distances."""
+    density: Density | None = None
+    classifier: Classifier | None = None

@@ -1,6 +1,6 @@
 """Settings of a training run, the same for every model."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from a2g_jax.errors import InputError
 
@@ -81,31 +81,3 @@ TRAIN_PRESETS: dict[str, TrainConfig] = {
         validate_every=500,
     ),
 }
-
-#: Both flows clip gradients and go up and down with the learning rate in the same way.
-_FLOW = TrainConfig(
-    steps=80_000, learning_rate=1.5e-3, schedule="noam", warmup_steps=3_000, clip_value=5.0, clip_norm=100.0
-)
-
-MODEL_PRESETS: dict[str, dict[str, TrainConfig]] = {
-    "stylized_flow": {
-        "paper": replace(_FLOW, steps=30_000, batch_size=100),
-        "ted": replace(_FLOW, batch_size=200, learning_rate=1e-3),
-        "moglow": replace(_FLOW, batch_size=80),
-        "moglow_styled": replace(_FLOW, batch_size=80),
-        "tiny": replace(_FLOW, steps=4_000, batch_size=16, warmup_steps=200, checkpoint_every=500, validate_every=500),
-    }
-}
-"""Of models whose papers train otherwise than :data:`TRAIN_PRESETS` has it: the stylized flow's (Sec. 4), and MoGlow's
-as its authors prefer them for StyleGestures."""
-
-
-def training_preset(model: str, preset: str) -> TrainConfig:
-    """How a preset of a model is trained.
-
-    Args:
-        model: by the name in :data:`a2g_jax.models.MODELS`.
-        preset: one of its presets.
-    """
-    own = MODEL_PRESETS.get(model, {})
-    return own[preset] if preset in own else TRAIN_PRESETS[preset]

@@ -6,8 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
-#: Windows start at multiples of this many frames.
-BLOCK = 128
+from a2g_jax.nn.blocks import BLOCK
 
 Tree = TypeVar("Tree")
 

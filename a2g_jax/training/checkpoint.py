@@ -3,6 +3,7 @@
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 from orbax.checkpoint import v1 as ocp
 
@@ -11,14 +12,14 @@ from a2g_jax.training.state import TrainState
 
 
 class Checkpoints:
-    """The checkpoints folder of a run. A checkpoint exists whole under its step's number or not at all."""
+    """The checkpoints folder of a run: a checkpoint is complete under its step's number, or absent."""
 
     def __init__(self, folder: str | os.PathLike[str], keep: int) -> None:
         self.folder = Path(folder).absolute()
         self.keep = max(1, keep)
 
     def steps(self) -> list[int]:
-        """Steps of the checkpoints there are, oldest first."""
+        """Steps of the checkpoints, oldest first."""
         if not self.folder.is_dir():
             return []
         return sorted(int(path.name) for path in self.folder.iterdir() if path.is_dir() and path.name.isdigit())
@@ -48,18 +49,34 @@ class Checkpoints:
             return None
         path = self.folder / str(steps[-1])
         try:
-            tree = ocp.load(path, like._asdict())
+            tree = _load(path, like)
         except Exception as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
-                f"{path}: cannot be resumed from ({first[:200]}); remove this folder to go on from the one before it,"
+                f"{path}: cannot be resumed from ({first[:200]}); remove this folder to resume from the one before it,"
                 " or start anew without --resume."
             ) from error
         return TrainState(**tree)
 
 
+def _load(path: Path, like: TrainState) -> dict[str, Any]:
+    """The arrays of a checkpoint; those of version 0.1 had the state of one optimiser under another name."""
+    if len(like.optimisers) > 1 or "optimisers" in _names(path):
+        return dict(ocp.load(path, like._asdict()))
+    (name, optimiser), *_ = like.optimisers.items()
+    before = {key: value for key, value in like._asdict().items() if key != "optimisers"}
+    tree = dict(ocp.load(path, {**before, "optimiser": optimiser}))
+    return {**tree, "optimisers": {name: tree.pop("optimiser")}}
+
+
+def _names(path: Path) -> set[str]:
+    """Top-level names of the arrays in a checkpoint."""
+    metadata: Any = ocp.metadata(path).metadata
+    return set(metadata)
+
+
 def sweep_unfinished(folder: Path) -> None:
-    """Remove what a killed save left behind."""
+    """Remove the unfinished folders of a killed save."""
     if folder.is_dir():
         for path in folder.iterdir():
             if path.is_dir() and not path.name.isdigit():

@@ -1,4 +1,4 @@
-"""What a training run tells: a progress bar, metrics.jsonl, and TensorBoard if asked for."""
+"""The output of a training run: a progress bar, metrics.jsonl, and TensorBoard on request."""
 
 import json
 import math
@@ -18,7 +18,7 @@ class MetricsLog:
     a resumed run's file equals an uninterrupted one's.
     """
 
-    def __init__(self, folder: Path, done: int, settings: TrainConfig, progress: bool) -> None:
+    def __init__(self, folder: Path, done: int, settings: TrainConfig, progress: bool, total: int) -> None:
         self.path = folder / "metrics.jsonl"
         self._drop_after(done)
         self.settings = settings
@@ -36,7 +36,7 @@ class MetricsLog:
         # A terminal gets a moving bar; a log file gets a line now and then.
         every = 0.5 if sys.stderr.isatty() else 30.0
         self.bar = tqdm(
-            total=settings.steps,
+            total=total,
             initial=done,
             unit="step",
             desc="training",
@@ -82,7 +82,7 @@ class MetricsLog:
                 self.tensorboard.add_scalar(f"{split}/{name}", value, step)
 
     def _drop_after(self, done: int) -> None:
-        """Forget lines of steps that will be done again, and a line that a kill cut short."""
+        """Remove lines of steps that will be repeated, and a line that a kill cut short."""
         if not self.path.exists():
             return
         kept = []

@@ -13,16 +13,17 @@ from typing import Any
 import jax
 import numpy as np
 
-from a2g_jax.data.batches import Crops, Dressing, crops_in, draw_starts, find_crops, gather, gather_from_disk
+from a2g_jax.data.batch import ClipShape, clip_shape, gather, gather_clips, gather_from_disk
+from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_starts, find_crops
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
-from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import FORMAT, RUN_FILE, WEIGHTS_FILE, Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 from a2g_jax.training.validation import collect_summary, validate
 
@@ -31,7 +32,7 @@ _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_chec
 
 
 class TrainingError(A2GError):
-    """Training cannot go on: the message says at which step, why, and what to try."""
+    """Training cannot continue: the message says at which step, why, and what to try."""
 
 
 def train(
@@ -39,11 +40,11 @@ def train(
 ) -> Run:
     """Train a model on a corpus; the run folder can generate at any time after the first checkpoint.
 
-    Killed at any moment and resumed, it ends with the same parameters, bit for bit, as if it had not been.
+    Interruptible and resumable: killed at any moment and resumed, it ends with the same parameters, bit for bit.
 
     Args:
         out: the run folder. It must not hold a run, unless resuming.
-        resume: go on from the latest checkpoint; starts anew where there is none.
+        resume: continue from the latest checkpoint; starts anew where there is none.
         progress: show a progress bar on standard error.
 
     Raises:
@@ -54,9 +55,19 @@ def train(
     out = Path(out)
     settings = config.train_config
     # Whatever can be wrong is found before anything is written.
-    find_crops(corpus, "train", config.model_config.clip_frames)
     model = config.build()
-    state = init_state(model, settings)
+    find_crops(corpus, "train", model.clip_frames)
+    if model.needs_perceptual and config.data().perceptual is None:
+        raise InputError(
+            f"{config.model}: its perceptual loss needs a feature network; train one with 'a2g train"
+            " motion_autoencoder' on this corpus and name it with --features, or set the loss's weight to 0."
+        )
+    shape = clip_shape(model.batch_fields, model.clip_frames, corpus.fps, corpus.mel.sample_rate)
+    for name in shape.arrays:
+        corpus.array(name)
+    spans = stage_spans(model, settings)
+    total = spans[-1].stop
+    state = init_state(model, spans, settings.seed)
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
     _check_folder(out, config, checkpoints, resume, corpus.on_demand)
     if resume and (restored := checkpoints.restore(state)) is not None:
@@ -67,40 +78,42 @@ def train(
     sweep_unfinished(checkpoints.folder)
     with (
         _stop_requested() as stop,
-        PartStream(corpus, settings.part_steps, settings.steps) as parts,
-        MetricsLog(out, done, settings, progress) as log,
+        PartStream(corpus, settings.part_steps, total, arrays=shape.arrays) as parts,
+        MetricsLog(out, done, settings, progress, total) as log,
     ):
         write_json(out / RUN_FILE, run_to_json(config, done))
         run = None
-        steps = _Steps(model, settings, config)
-        while done < settings.steps:
+        steps = _Steps(config, shape)
+        ends = {span.stop for span in spans}
+        while done < total:
+            span = span_at(spans, done)
             part = parts.get(done, stop)
             if part is None:
                 checkpoints.save(state)
                 export(state)
-                raise _interrupted(out, done, settings)
-            state, metrics = steps.of(part)(state)
+                raise _interrupted(out, done, total)
+            state, metrics = steps.of(span, part)(state)
             done += 1
-            if done % settings.log_every == 0 or done == settings.steps:
+            if done % settings.log_every == 0 or done in ends:
                 values = {name: float(value) for name, value in jax.device_get(metrics).items()}
                 _check_finite(state, done, values, checkpoints)
                 log.write(done, values)
             else:
                 log.tick(done)
-            if done % settings.validate_every == 0 or done == settings.steps:
-                log.write_validation(done, validate(model, state.params, corpus, config))
-            if done % settings.checkpoint_every == 0 or done == settings.steps or stop.is_set():
+            if done % settings.validate_every == 0 or done in ends:
+                log.write_validation(done, validate(model, state.params, corpus, config, stage=span.stage))
+            if done % settings.checkpoint_every == 0 or done in ends or stop.is_set():
                 _check_finite(state, done, {}, checkpoints)
                 checkpoints.save(state)
                 run = export(state)
             if stop.is_set():
-                raise _interrupted(out, done, settings)
+                raise _interrupted(out, done, total)
     # A run that was finished before has nothing to do but may lack its weights, if it was killed while writing them.
     return run if run is not None else export(state)
 
 
-def _interrupted(out: Path, done: int, settings: TrainConfig) -> Interrupted:
-    return Interrupted(f"{out}: stopped after step {done} of {settings.steps}; go on with --resume.")
+def _interrupted(out: Path, done: int, total: int) -> Interrupted:
+    return Interrupted(f"{out}: stopped after step {done} of {total}; resume with --resume.")
 
 
 def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool, on_demand: bool) -> None:
@@ -113,7 +126,7 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
     if not checkpoints.steps() and not (out / WEIGHTS_FILE).exists():
         return  # stopped before its first checkpoint: nothing is lost by starting anew
     if not resume:
-        raise InputError(f"{out}: holds a run already; go on with it by --resume, or choose another folder.")
+        raise InputError(f"{out}: holds a run already; continue it with --resume, or choose another folder.")
     values = read_json(out / RUN_FILE)
     if not isinstance(values, dict) or values.get("format") != FORMAT or not isinstance(values.get("corpus"), dict):
         raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
@@ -144,58 +157,50 @@ _Step = Callable[[TrainState], tuple[TrainState, Metrics]]
 class _Steps:
     """Steps on the parts of a corpus; parts alike in the lengths of their recordings share their compiled programs."""
 
-    def __init__(self, model: Model, settings: TrainConfig, config: RunConfig) -> None:
-        self._arguments = model, settings, config
-        self._programs: dict[tuple[bytes, ...], Callable[[Any], _Step]] = {}
-        self._last: tuple[Part, _Step] | None = None
+    def __init__(self, config: RunConfig, shape: ClipShape) -> None:
+        self._config, self._shape = config, shape
+        self._programs: dict[tuple[Any, ...], Callable[[Any], _Step]] = {}
+        self._last: tuple[StageSpan, Part, _Step] | None = None
 
-    def of(self, part: Part) -> _Step:
-        """The step on a part; kept until another part is asked for."""
-        if self._last is None or self._last[0] is not part:
-            model, settings, config = self._arguments
-            crops = crops_in(part.segments, model.clip_frames, "the longest recording of a part")
-            key = tuple(np.asarray(array).tobytes() for array in crops)
+    def of(self, span: StageSpan, part: Part) -> _Step:
+        """The step of a stage on a part; kept until another one is requested."""
+        if self._last is None or self._last[0] is not span or self._last[1] is not part:
+            crops = crops_in(part.segments, self._shape.frames, "the longest recording of a part")
+            key = (span.stage.name, *(np.asarray(array).tobytes() for array in crops))
             if key not in self._programs:
-                self._programs[key] = _programs(model, settings, crops, config)
-            self._last = None  # lets go of the part before, before the next one is put on the device
-            self._last = part, self._programs[key](part)
-        return self._last[1]
+                self._programs[key] = step_programs(span, self._shape, crops, self._config)
+            self._last = None  # frees the part before, before the next one is put on the device
+            self._last = span, part, self._programs[key](part)
+        return self._last[2]
 
 
-def _step_function(model: Model, settings: TrainConfig, corpus: Corpus, crops: Crops, config: RunConfig) -> _Step:
-    """The step on an ordinary corpus."""
-    return _programs(model, settings, crops, config)(corpus)
-
-
-def _programs(model: Model, settings: TrainConfig, crops: Crops, config: RunConfig) -> Callable[[Corpus | Part], _Step]:
+def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunConfig) -> Callable[[Part], _Step]:
     """One whole step: choose clips, augment, compute, update. The same clips wherever the data lies."""
-    frames = model.clip_frames
-    dressing = Dressing(config.statistics["audio"], settings.augmentation)
+    settings = config.train_config
+    make_batch = BatchMaker(config.statistics["audio"], settings.augmentation)
 
-    def finish(state: TrainState, audio, pose, labels) -> tuple[TrainState, Metrics]:
-        _, dress_key, model_key = step_keys(state.key, state.step)
-        return advance(model, settings, state, dressing(dress_key, audio, pose, labels), model_key)
+    def finish(state: TrainState, clips: dict[str, Any]) -> tuple[TrainState, Metrics]:
+        _, augment_key, model_key = step_keys(state.key, state.step)
+        return advance(span, state, make_batch(augment_key, clips), model_key)
 
     def starts(state: TrainState):
         return draw_starts(step_keys(state.key, state.step)[0], crops, settings.batch_size)
 
     @partial(jax.jit, donate_argnums=0)
-    def on_device(state: TrainState, audio, pose, labels):
-        rows = starts(state)
-        return finish(state, gather(audio, rows, frames), gather(pose, rows, frames), labels[rows])
+    def on_device(state: TrainState, arrays: dict[str, Any]):
+        return finish(state, gather_clips(arrays, shape, starts(state), gather))
 
     choose = jax.jit(starts)
     compute = jax.jit(finish, donate_argnums=0)
 
-    def on(data: Corpus | Part) -> _Step:
-        if (data.audio.nbytes + data.pose.nbytes) / 1e6 <= settings.device_megabytes:
-            held = [jax.device_put(np.asarray(array)) for array in (data.audio, data.pose, data.labels)]
-            return lambda state: on_device(state, *held)
+    def on(part: Part) -> _Step:
+        if sum(array.nbytes for array in part.arrays.values()) / 1e6 <= settings.device_megabytes:
+            held = {name: jax.device_put(np.asarray(array)) for name, array in part.arrays.items()}
+            return lambda state: on_device(state, held)
 
         def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
-            rows = np.asarray(choose(state))
-            clips = [gather_from_disk(array, rows, frames) for array in (data.audio, data.pose)]
-            return compute(state, *clips, data.labels[rows])
+            clips = gather_clips(part.arrays, shape, np.asarray(choose(state)), gather_from_disk)
+            return compute(state, clips)
 
         return from_disk
 

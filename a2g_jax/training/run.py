@@ -1,13 +1,15 @@
 """A run folder: everything that generation needs, in JSON and safetensors."""
 
 import os
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from flax.traverse_util import flatten_dict, unflatten_dict
+from jaxtyping import Array
 
 from a2g_jax import __version__
 from a2g_jax.config import from_json
@@ -15,13 +17,13 @@ from a2g_jax.data.corpus import Corpus, body_from_json, body_to_json
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import atomic_path, read_json, sha256_file, write_json
-from a2g_jax.models import find_model
 from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models.entry import Entry
+from a2g_jax.models.registry import find_model, find_trained_model
 from a2g_jax.models.train_config import TrainConfig
-from a2g_jax.training.perceptual import Perceptual, absent
 
 FORMAT = "a2g_jax run"
 VERSION = 1
@@ -30,8 +32,19 @@ WEIGHTS_FILE = "weights.safetensors"
 
 
 @dataclass(frozen=True, eq=False)
+class Perceptual:
+    """The frozen feature network of a perceptual loss."""
+
+    fingerprint: str
+    """SHA-256 of its weights."""
+    features: Callable[[Array], list[Array]] | None = None
+    """Poses (B, T, R, D) to features of each block (B, T, width), differentiable; None in a finished run, since only
+    training needs them."""
+
+
+@dataclass(frozen=True, eq=False)
 class RunConfig:
-    """What a run is, apart from its weights."""
+    """The description of a run: everything but its weights."""
 
     model: str
     preset: str
@@ -39,27 +52,40 @@ class RunConfig:
     train_config: TrainConfig
     fps: float
     mel: MelConfig
-    body: Skeleton | PoseLayout
-    """What the rows of a pose are."""
-    representation: str
-    """How a pose is written down: see :mod:`a2g_jax.geometry.pose_space`."""
+    space: PoseSpace
+    """The body, and the kind of numbers that its poses are written in."""
     statistics: dict[str, Statistics]
     """``audio``, ``pose`` and ``root`` of the corpus's training split."""
     corpus: dict[str, Any]
     """Fingerprint, recipe, length, emotions and speakers of the corpus."""
     perceptual: Perceptual | None = None
     """The feature network of a perceptual loss."""
+    sampling: Any = None
+    """Settings of generation; None for those of the preset."""
+
+    @property
+    def entry(self) -> Entry:
+        """The model's own description."""
+        return find_model(self.model)
+
+    @property
+    def sampling_settings(self) -> Any:
+        """Settings of generation."""
+        return self.entry.sampling_preset(self.preset) if self.sampling is None else self.sampling
 
     @property
     def skeleton(self) -> Skeleton:
-        """The skeleton that moves.
+        """The skeleton of the generated motion.
 
         Raises:
-            InputError: the model makes keypoints or directions.
+            InputError: the model generates keypoints or directions.
         """
-        if not isinstance(self.body, Skeleton):
-            raise InputError(f"{self.model} was trained on {self.representation}, which have no skeleton.")
-        return self.body
+        if not self.space.has_rotations:
+            raise InputError(
+                f"the run of {self.model} was trained on {self.space.noun}, which have no skeleton to animate; train on"
+                " a corpus of rotations (a2g prepare --pose 6d), or score it with 'a2g evaluate'."
+            )
+        return self.space.skeleton
 
     @classmethod
     def of(
@@ -76,7 +102,8 @@ class RunConfig:
         Raises:
             InputError: the model does not take such poses.
         """
-        corpus.require_pose(*find_model(model).poses)
+        if poses := find_model(model).poses:
+            corpus.require_pose(*poses)
         about = {
             "fingerprint": corpus.fingerprint,
             "recipe": corpus.recipe,
@@ -91,29 +118,43 @@ class RunConfig:
             train_config=train_config,
             fps=corpus.fps,
             mel=corpus.mel,
-            body=corpus.body,
-            representation=corpus.representation,
+            space=corpus.space,
             statistics=corpus.statistics,
             corpus=about,
             perceptual=perceptual,
         )
 
     def data(self) -> Data:
-        """What the model is built for."""
+        """The properties of the corpus that the model is built for."""
         return Data(
-            self.body,
+            self.space,
             self.fps,
             self.mel.width,
             self.statistics["pose"],
-            self.representation,
             tuple(self.corpus.get("emotions", ())),
             tuple(self.corpus.get("speakers", ())),
             None if self.perceptual is None else self.perceptual.features,
+            self.mel.sample_rate,
         )
 
     def build(self) -> Model:
         """The model's functions."""
-        return find_model(self.model).build(self.model_config, self.data())
+        model: Model = self.entry.builder()(self.model_config, self.data(), self.sampling_settings)
+        return model
+
+    def with_sampling(self, **changes: Any) -> "RunConfig":
+        """The run with other settings of generation.
+
+        Raises:
+            InputError: a setting that the model does not have, or a value out of range.
+        """
+        known = [field.name for field in fields(self.sampling_settings)]
+        for name in changes:
+            if name not in known:
+                raise InputError(
+                    f"{self.model}: has no setting of generation {name!r}; it has: {', '.join(known) or 'none'}."
+                )
+        return replace(self, sampling=replace(self.sampling_settings, **changes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,11 +194,12 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         "preset": config.preset,
         "steps": steps,
         "model_config": asdict(config.model_config),
+        "sampling": asdict(config.sampling_settings),
         "train_config": asdict(config.train_config),
         "fps": config.fps,
         "mel": asdict(config.mel),
-        "pose": config.representation,
-        **body_to_json(config.body),
+        "pose": config.space.kind,
+        **body_to_json(config.space.body),
         "corpus": config.corpus,
         "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
     }
@@ -183,7 +225,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it anew.")
     weights = folder / WEIGHTS_FILE
     if not weights.is_file():
-        raise InputError(f"{weights}: there is no such file; go on training with 'a2g train ... --resume'.")
+        raise InputError(f"{weights}: there is no such file; resume training with 'a2g train ... --resume'.")
     try:
         arrays = load_file(weights)
     except (SafetensorError, OSError, ValueError) as error:
@@ -193,18 +235,20 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             name: Statistics(arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"])
             for name in ("audio", "pose", "root")
         }
+        entry = find_trained_model(str(values["model"]), str(about))
+        settings, sampling = _split_settings(entry, values)
         config = RunConfig(
             model=values["model"],
             preset=values["preset"],
-            model_config=from_json(find_model(values["model"]).config_class, values["model_config"], str(about)),
+            model_config=from_json(entry.config, settings, str(about)),
+            sampling=from_json(entry.sampling, sampling, str(about)),
             train_config=from_json(TrainConfig, values["train_config"], str(about)),
             fps=float(values["fps"]),
             mel=from_json(MelConfig, values["mel"], str(about)),
-            body=body_from_json(values),
-            representation=str(values.get("pose", "6d")),
+            space=PoseSpace(body_from_json(values), str(values.get("pose", "6d"))),
             statistics=statistics,
             corpus=values["corpus"],
-            perceptual=absent(values["feature_network"]) if values.get("feature_network") else None,
+            perceptual=Perceptual(values["feature_network"]) if values.get("feature_network") else None,
         )
         steps = int(values["steps"])
     except InputError:
@@ -222,26 +266,43 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     return Run(config, params, summary, steps)
 
 
+#: Settings of generation that runs of version 0.1 kept among those of the model, by their names then.
+_MOVED = {"control_curves": "controls"}
+
+
+def _split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings of the model and of generation; in runs of version 0.1 both stand together."""
+    settings, sampling = dict(values["model_config"]), values.get("sampling")
+    if sampling is not None:
+        return settings, dict(sampling)
+    own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
+    moved = {name: _MOVED.get(name, name) for name in settings}
+    return (
+        {name: value for name, value in settings.items() if moved[name] not in own},
+        {moved[name]: value for name, value in settings.items() if moved[name] in own},
+    )
+
+
 def demo_run() -> Run:
-    """The trained run that comes with the package."""
+    """The trained Audio2Gestures that is shipped with the package: ``demo`` on the command line."""
     with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
         return load_run(folder)
 
 
 def demo_flow_run() -> Run:
-    """The trained flow that comes with the package: ``demo-flow`` on the command line."""
+    """The trained flow that is shipped with the package: ``demo-flow`` on the command line."""
     with resources.as_file(resources.files("a2g_jax") / "demo_flow") as folder:
         return load_run(folder)
 
 
 def open_run(name: str | os.PathLike[str]) -> Run:
-    """A run folder, or one of those that come with the package: ``demo`` and ``demo-flow``."""
+    """A run folder, or one of those that are shipped with the package: ``demo`` and ``demo-flow``."""
     shipped = {"demo": demo_run, "demo-flow": demo_flow_run}.get(str(name))
     return load_run(name) if shipped is None else shipped()
 
 
 def demo_feature_run() -> tuple[Run, str]:
-    """The feature network that comes with the package, and the SHA-256 of its weights."""
+    """The shipped feature network, and the SHA-256 of its weights."""
     with resources.as_file(resources.files("a2g_jax") / "demo_features") as folder:
         return load_run(folder), sha256_file(folder / WEIGHTS_FILE)
 

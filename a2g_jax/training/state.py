@@ -1,7 +1,7 @@
 """The state of a training run and the step that advances it."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,17 +9,20 @@ import optax
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
-from a2g_jax.models.base import Model, Params
+from a2g_jax.models.base import Model, Params, Stage, Update
+from a2g_jax.models.optimiser import make_optimiser
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.stages import StageSpan
 
 
 class TrainState(NamedTuple):
-    """Everything that a run needs to go on; a pytree. The data position is the step: batches are a function of it."""
+    """Everything that a run needs to resume; a pytree. The data position is the step: batches are a function of it."""
 
     params: Params
-    optimiser: optax.OptState
+    optimisers: dict[str, optax.OptState]
+    """Of each update of each stage: see :func:`optimiser_name`."""
     step: Int[Array, ""]
-    """Steps done."""
+    """Steps done, over all stages."""
     key: Key[Array, ""]
     """The run's key; never changes, and is folded with the step."""
     good: Array
@@ -29,50 +32,36 @@ class TrainState(NamedTuple):
 Metrics = dict[str, Float[Array, ""]]
 
 
-def learning_rate(config: TrainConfig) -> optax.Schedule:
-    """Learning rate as a function of the step."""
-    if config.schedule == "noam":
-        return _noam(config)
-    if config.schedule == "constant":
-        after = optax.constant_schedule(config.learning_rate)
-    elif config.schedule == "cosine":
-        after = optax.cosine_decay_schedule(
-            config.learning_rate, max(1, config.steps - config.warmup_steps), alpha=0.01
-        )
-    else:
-        raise ValueError(f"Expected schedule 'constant' or 'cosine'; got {config.schedule!r}.")
-    if config.warmup_steps == 0:
-        return after
-    up = optax.linear_schedule(0.0, config.learning_rate, config.warmup_steps)
-    return optax.join_schedules([up, after], [config.warmup_steps])
+def optimiser_name(stage: Stage, update: Update) -> str:
+    """The name of an update's optimiser in the state."""
+    return f"{stage.name}.{update.name}"
 
 
-def _noam(config: TrainConfig) -> optax.Schedule:
-    """Linearly up to the learning rate over the warm-up, then down with the root of the step, to a tenth of it."""
-    warmup = max(1, config.warmup_steps)
+def optimiser_of(update: Update, config: TrainConfig) -> optax.GradientTransformation:
+    """The optimiser of an update.
 
-    def schedule(count):
-        number = jnp.asarray(count, jnp.float32) + 1.0
-        scale = jnp.sqrt(warmup) * jnp.minimum(number * warmup**-1.5, number**-0.5)
-        return config.learning_rate * jnp.where(number > warmup, jnp.maximum(scale, 0.1), scale)
-
-    return schedule
+    Args:
+        config: settings of its stage.
+    """
+    return (update.optimiser or make_optimiser)(config)
 
 
-def make_optimiser(config: TrainConfig) -> optax.GradientTransformation:
-    """Adam with the schedule and clipping of the settings."""
-    adam = optax.adam(learning_rate(config))
-    clips = [optax.clip(config.clip_value)] if config.clip_value > 0 else []
-    clips += [optax.clip_by_global_norm(config.clip_norm)] if config.clip_norm > 0 else []
-    return optax.chain(*clips, adam) if clips else adam
+def trained(update: Update, params: Params) -> Params:
+    """The part of the parameters that an update changes."""
+    return {name: params[name] for name in update.trains} if update.trains else params
 
 
-def init_state(model: Model, config: TrainConfig) -> TrainState:
-    """A run at step 0."""
-    key = jax.random.key(config.seed)
+def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int) -> TrainState:
+    """A run at step 0, with the optimisers of all stages."""
+    key = jax.random.key(seed)
     # Step numbers count up from 0, so the initial weights take the one number that no step has.
     params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
-    return TrainState(params, make_optimiser(config).init(params), jnp.zeros((), jnp.int32), key, jnp.array(True))
+    optimisers = {
+        optimiser_name(span.stage, update): optimiser_of(update, span.config).init(trained(update, params))
+        for span in spans
+        for update in span.stage.updates
+    }
+    return TrainState(params, optimisers, jnp.zeros((), jnp.int32), key, jnp.array(True))
 
 
 def step_keys(key: Key[Array, ""], step: Int[Array, ""]) -> Key[Array, " 3"]:
@@ -80,24 +69,53 @@ def step_keys(key: Key[Array, ""], step: Int[Array, ""]) -> Key[Array, " 3"]:
     return jax.random.split(jax.random.fold_in(key, step), 3)
 
 
-def advance(
-    model: Model, config: TrainConfig, state: TrainState, batch: Batch, key: Key[Array, ""]
-) -> tuple[TrainState, Metrics]:
-    """One step of training, to be jitted.
+def advance(span: StageSpan, state: TrainState, batch: Batch, key: Key[Array, ""]) -> tuple[TrainState, Metrics]:
+    """One step of a stage, to be jitted: its updates one after another on one batch.
 
-    A step whose loss or gradient is not finite changes no parameter; from then on ``good`` is false and no later step
-    changes any, until the host notices and stops.
+    A step whose losses or gradients are not finite changes no parameter; from then on ``good`` is false and no later
+    step changes any, until the host notices and stops.
     """
-    params = state.params
-    if (warm_start := model.warm_start) is not None:
-        params = jax.lax.cond(state.step == 0, lambda p: warm_start(p, batch), lambda p: p, params)
-    (loss, terms), gradient = jax.value_and_grad(model.loss, has_aux=True)(params, key, batch, state.step)
-    norm = optax.global_norm(gradient)
-    good = state.good & jnp.isfinite(loss) & jnp.isfinite(norm)
-    updates, optimiser = make_optimiser(config).update(gradient, state.optimiser, params)
-    params = optax.apply_updates(params, updates)
+    stage, params = span.stage, state.params
+    step = state.step - span.first if span.first else state.step
+    if (warm_start := stage.warm_start) is not None:
+        params = jax.lax.cond(step == 0, lambda p: warm_start(p, batch), lambda p: p, params)
+    good, metrics, total = state.good, {}, jnp.zeros(())
+    optimisers = dict(state.optimisers)
+    single = len(stage.updates) == 1
+    for number, update in enumerate(stage.updates):
+        own = key if single else jax.random.fold_in(key, number)
+        params, name = dict(params), optimiser_name(stage, update)
+        (loss, terms), gradient = _gradient(update, params, own, batch, step)
+        norm = optax.global_norm(gradient)
+        good &= jnp.isfinite(loss) & jnp.isfinite(norm)
+        part = trained(update, params)
+        changes, optimisers[name] = optimiser_of(update, span.config).update(gradient, optimisers[name], part)
+        params |= optax.apply_updates(part, changes)
+        total = loss if single else total + loss
+        metrics |= {"gradient_norm" if single else f"gradient_norm_{update.name}": norm, **terms}
     keep: Callable[[Array, Array], Array] = lambda new, old: jnp.where(good, new, old)  # noqa: E731
     params = jax.tree.map(keep, params, state.params)
-    optimiser = jax.tree.map(keep, optimiser, state.optimiser)
-    metrics = {"loss": loss, "gradient_norm": norm, **terms}
-    return TrainState(params, optimiser, state.step + 1, state.key, good), metrics
+    optimisers = jax.tree.map(keep, optimisers, state.optimisers)
+    return TrainState(params, optimisers, state.step + 1, state.key, good), {"loss": total, **metrics}
+
+
+def _gradient(update: Update, params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> Any:
+    """Loss with its terms, and the gradient with respect to the part that the update trains."""
+
+    def loss(part: Params) -> tuple[Array, dict[str, Array]]:
+        return update.loss({**params, **part}, key, batch, step)
+
+    return jax.value_and_grad(loss, has_aux=True)(trained(update, params))
+
+
+def held_out_loss(
+    stage: Stage, params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+) -> tuple[Float[Array, ""], dict[str, Array]]:
+    """The loss of a stage on held-out clips, and its terms: its own, or the sum over its updates."""
+    if stage.validation_loss is not None:
+        return stage.validation_loss(params, key, batch, step)
+    first, *others = (update.loss(params, key, batch, step) for update in stage.updates)
+    total, terms = first[0], dict(first[1])
+    for loss, more in others:
+        total, terms = total + loss, {**terms, **more}
+    return total, terms

@@ -23,7 +23,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.places import Body
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style
-from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement_with_null

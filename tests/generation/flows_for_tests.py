@@ -11,7 +11,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.pose_track import represent
 from a2g_jax.models.stylized_flow import StylizedFlowConfig, build
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.talker.recordings import talk

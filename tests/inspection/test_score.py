@@ -14,7 +14,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.evaluation.likelihood import compiled_score
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.geometry.motion import resample
-from a2g_jax.geometry.pose_space import represent
+from a2g_jax.geometry.pose_track import represent
 from a2g_jax.inspection import likelihood as score_module
 from a2g_jax.inspection.likelihood import score_motion
 from a2g_jax.inspection.unlikely import acceleration_changes, unlikely_moments

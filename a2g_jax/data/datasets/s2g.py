@@ -38,7 +38,7 @@ from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_layout import PoseTrack
+from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.untrusted import Limits, read_npz
 
 FPS = 15.0

@@ -33,7 +33,8 @@ from a2g_jax.data.datasets.smplx import float_array
 from a2g_jax.data.datasets.source import Take
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack
+from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.untrusted import Limits, LmdbFile, decode_arrow
 from a2g_jax.io.words import Word
 

@@ -1,4 +1,4 @@
-"""The latent space of a trained Audio2Gestures, to look at and to change: what the notebooks work with."""
+"""The latent space of a trained Audio2Gestures: encoding, drawing, editing and decoding of codes."""
 
 from dataclasses import dataclass, replace
 
@@ -9,15 +9,15 @@ from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
-from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.engine import WINDOW
-from a2g_jax.geometry.ground import plant_feet
+from a2g_jax.generation.generator import speech_features, stand_rotations
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
 from a2g_jax.models.audio2gestures.codec import Codec
+from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import apply_edits, parse_edit
-from a2g_jax.models.audio2gestures.model import build, draw_codes
-from a2g_jax.nn.noise import BLOCK
+from a2g_jax.models.audio2gestures.model import draw_codes
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 
 Code = Float[Array, "T C"]
@@ -56,41 +56,41 @@ class LatentSpace:
             InputError: the run is not of Audio2Gestures on a skeleton with both codes.
         """
         config = run.config.model_config
-        if run.config.model != "audio2gestures" or not config.split:
+        if not isinstance(config, Audio2GesturesConfig) or not config.split:
             raise InputError(
                 f"a run of {run.config.model} has no shared and specific codes; take one of audio2gestures."
             )
         self._skeleton, self._run = run.config.skeleton, run
         self.points: int = config.dct_points
-        data = run.config.data()
-        networks = Codec(replace(config, edits=()), data)
-        model = build(networks.config, data)
+        #: Settings of generation; their edits are applied by :meth:`edit` alone.
+        self.sampling: Audio2GesturesSampling = run.config.sampling_settings
+        plain = replace(self.sampling, edits=(), keep_shared=None, keep_specific=None)
+        codec, model = Codec(config, run.config.data()), run.config.build()
+        space = run.config.space
         self._context = -(-model.halo // BLOCK) * BLOCK
         self._params, self._summary = jax.device_put(run.params), jax.device_put(run.summary)
 
         def draw(params, summary, audio, key):
-            shared = networks.encode_audio(params, audio[None])
-            return draw_codes(networks, params, summary, key, shared, jnp.int32(-self._context))
+            shared = codec.encode_audio(params, audio[None])
+            return draw_codes(codec, plain, params, summary, key, shared, jnp.int32(-self._context))
 
         def encode(params, pose):
-            shared, specific = networks.encode_motion(params, pose[None])
+            shared, specific = codec.encode_motion(params, pose[None])
             assert specific is not None
-            return networks.to_time(shared.mean), networks.to_time(specific.mean)
+            return codec.to_time(shared.mean), codec.to_time(specific.mean)
 
         self._draw, self._encode = jax.jit(draw), jax.jit(encode)
-        self._decode = jax.jit(lambda params, s, i: matrix_from_6d(networks.decode(params, s[None], i[None])[0]))
+        self._write = space.from_rotations
+        self._decode = jax.jit(lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None])[0]))
 
     def from_audio(self, audio: Float[np.ndarray, " N"], seed: int = 0, sample: int = 0) -> Codes:
-        """S_A of speech, and an I_R drawn for it: what ``a2g generate --seed`` has for the sample of that number.
+        """S_A of speech, and an I_R drawn for it: that of ``a2g generate --seed`` for the sample of this number.
 
         Args:
             audio: mono, at the run's sample rate.
         """
-        config = self._run.config
-        frames = round(len(audio) / config.mel.sample_rate * config.fps)
-        if frames == 0:
-            raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
-        features = log_mel(audio, config.mel, config.fps, frames)
+        config, features = self._run.config, speech_features(self._run, audio)
+        frames = len(features)
         padded = np.pad(features, ((self._context, self._after(frames)), (0, 0)), constant_values=features.min())
         normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)
         key = jax.random.fold_in(jax.random.key(seed), sample)
@@ -109,7 +109,7 @@ class LatentSpace:
                 f"the motion has {motion.skeleton.joints} joints at {motion.fps:g} fps, the run"
                 f" {self._skeleton.joints} at {self._run.config.fps:g}; retarget and resample it first."
             )
-        pose = np.asarray(matrix_to_6d(jnp.asarray(motion.rotations)))
+        pose = np.asarray(self._write(jnp.asarray(motion.rotations)))
         around = ((self._context, self._after(len(pose))), (0, 0), (0, 0))
         shared, specific = self._encode(self._params, np.pad(pose, around, mode="edge"))
         return Codes(shared[0], specific[0], self._context, len(pose))
@@ -118,12 +118,7 @@ class LatentSpace:
         """g(S, I), with a root that plants the feet."""
         stop = codes.context + codes.frames
         rotations = np.asarray(self._decode(self._params, codes.shared, codes.specific))[codes.context : stop]
-        config = self._run.config
-        return plant_feet(
-            Motion(rotations, np.zeros((len(rotations), 3), np.float32), self._skeleton, config.fps),
-            np.asarray(config.statistics["root"].mean),
-            np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean))),
-        )
+        return stand_rotations(self._run, rotations)
 
     def edit(self, codes: Codes, *edits: str, other: Codes | None = None) -> Codes:
         """Codes with their DCT bands edited; see :mod:`a2g_jax.models.audio2gestures.edits`.

@@ -9,9 +9,7 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.pins import Pin
 from a2g_jax.geometry.body_joints import find_body
-from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.metrics.physical import jerk
 
@@ -48,15 +46,13 @@ def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
     Raises:
         InputError: its poses are not rotations.
     """
-    corpus.require_pose("6d")
-    values, seen = [], 0
+    corpus.require_rotations()
+    values, frames = [], 0
     for segment in corpus.segments("train"):
-        pose = np.asarray(corpus.pose[segment.start : segment.stop], np.float32)
-        offsets = np.asarray(corpus.skeleton.offsets, np.float32)
-        places = np.asarray(joint_positions(matrix_from_6d(pose), offsets, corpus.skeleton.parents))
+        places = corpus.space.positions(np.asarray(corpus.pose[segment.start : segment.stop], np.float32))
         values.append(wrist_jerk(places, corpus.skeleton, corpus.fps))
-        seen += segment.frames
-        if seen > _MOST:
+        frames += segment.frames
+        if frames > _MOST:
             break
     return float(np.percentile(np.concatenate(values), percentile))
 

@@ -1,7 +1,7 @@
-"""Samples with clips pinned to their timeline, and what is said about them."""
+"""Samples with clips pinned to their timeline, and the report of how closely these are followed."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
 from a2g_jax.generation.audio2gestures.pin_report import corpus_jerk, local_places, report_pins, wrist_jerk
 from a2g_jax.generation.audio2gestures.pins import Pin, check_pins, pin_codes, read_pin
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.training.run import Run
 
 if TYPE_CHECKING:
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Pins:
-    """What is asked for."""
+    """Options of pinning."""
 
     texts: tuple[str, ...]
     """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
@@ -32,7 +31,7 @@ class Pins:
     shared: float = 0.0
     """From 0 to 1, how far a clip's own shared code replaces the audio's."""
     corpus: Corpus | None = None
-    """Whose 99th percentile of wrist jerk seams are held against; without one, the clips' and the unpinned sample's."""
+    """Its 99th percentile of wrist jerk limits seams; without one, that of the clips and the unpinned sample."""
 
     def place(self, run: Run, frames: int) -> "Pinned":
         """The clips on a run's skeleton, in speech of so many frames.
@@ -42,8 +41,9 @@ class Pins:
         """
         space = LatentSpace(run)
         config = run.config
-        facing = np.asarray(matrix_from_6d(np.asarray(config.statistics["pose"].mean[0])), np.float64)
-        pins = [read_pin(text, config.skeleton, config.fps, facing) for text in self.texts]
+        skeleton = config.skeleton
+        facing = np.asarray(config.space.mean_rotations(config.statistics["pose"].mean)[0], np.float64)
+        pins = [read_pin(text, skeleton, config.fps, facing) for text in self.texts]
         if self.corpus is not None and not self.corpus.skeleton.same_tree(config.skeleton):
             raise InputError(f"--pin-corpus {self.corpus.path}: has another skeleton than the run.")
         limit = None if self.corpus is None else corpus_jerk(self.corpus)
@@ -61,15 +61,13 @@ class Pinned:
     limit: float | None
     """Jerk of the corpus, m/s3."""
 
-    def stream(
-        self, audio: Float[np.ndarray, " N"], samples: int, seed: int, reports: list[list[dict[str, Any]]]
-    ) -> Iterator[Motion]:
-        """Samples as :meth:`~a2g_jax.generation.engine.Generator.stream` makes them, with the pins in them.
+    reports: list[list[dict[str, Any]]] = field(default_factory=list)
+    """Of each sample that :meth:`stream` has given, by :func:`report_pins`."""
 
-        Args:
-            reports: what is found about each sample's pins is put here.
-        """
-        edits = self.run.config.model_config.edits
+    def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
+        """Samples of :meth:`~a2g_jax.generation.generator.Generator.stream` with the pins in them."""
+        edits = self.space.sampling.all_edits
+        self.reports.clear()
         for sample in range(samples):
             codes = self.space.edit(self.space.from_audio(audio, seed, sample), *edits)
             plain = self.space.to_motion(codes)
@@ -78,7 +76,7 @@ class Pinned:
             limit, source = self.limit, "99th percentile of the corpus"
             if limit is None:
                 limit, source = self._usual(plain), "99th percentile of the clips and the unpinned sample"
-            reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
+            self.reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
             yield motion
 
     def lane(self) -> "Track":

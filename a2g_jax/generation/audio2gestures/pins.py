@@ -16,16 +16,13 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.latent_space import Codes, LatentSpace
-from a2g_jax.geometry.motion import Motion, resample
-from a2g_jax.geometry.retarget import find_rig, match_rigs, retarget
+from a2g_jax.generation.clips import read_on_skeleton
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh import read_bvh
-from a2g_jax.io.npz import read_motion_npz
 
 #: Shortest clip that is pinned, seconds: shorter ones drown in their transitions.
 SHORTEST = 0.2
-#: Degrees by which a bone at rest may point elsewhere before a clip on the same joints is retargeted.
-_SAME_REST = 1.0
 #: A second from 0 on, and maybe how many seconds of the clip.
 _FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 
@@ -93,59 +90,6 @@ def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray
     if facing is not None:
         motion, turned = face(motion, facing)
     return Pin(str(path), start, motion, turned)
-
-
-def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
-    """Any humanoid BVH, or an NPZ that this package wrote, on a run's skeleton at its frame rate.
-
-    Raises:
-        InputError: a file that cannot be read, or a rig that is not understood.
-    """
-    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
-    return on_skeleton(motion, skeleton, fps, str(path))
-
-
-def on_skeleton(motion: Motion, skeleton: Skeleton, fps: float, name: str) -> Motion:
-    """The rotations of a humanoid motion on another skeleton, at another rate.
-
-    Args:
-        name: of the motion, for messages.
-
-    Raises:
-        InputError: a rig that is not understood.
-    """
-    if not same_rest(motion.skeleton, skeleton):
-        source = find_rig(motion, name=name)
-        motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
-    # Bones of other lengths on the same joints need no retargeting: models see rotations alone.
-    return resample(replace(motion, skeleton=skeleton), fps)
-
-
-def same_rest(first: Skeleton, second: Skeleton) -> bool:
-    """Whether joints are the same and bones at rest point the same way, whatever their lengths."""
-    if not first.same_tree(second):
-        return False
-    ours, theirs = (np.asarray(skeleton.offsets, np.float64)[1:] for skeleton in (first, second))
-    lengths = np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1)
-    bones = lengths > 1e-8
-    cosine = (ours * theirs).sum(axis=1)[bones] / lengths[bones]
-    return bool(np.all(cosine > np.cos(np.deg2rad(_SAME_REST))))
-
-
-def face(motion: Motion, facing: Float[np.ndarray, "3 3"]) -> tuple[Motion, float]:
-    """A motion turned about the vertical so that its root is, on the whole, nearest to a rotation; and the degrees.
-
-    The angle has the least sum of squared differences of matrices in closed form: with ``A`` the sum of
-    ``R_t F^T`` over frames, ``trace(Y A)`` is greatest.
-    """
-    moment = np.einsum("tij,kj->ik", np.asarray(motion.rotations[:, 0], np.float64), facing)
-    angle = np.arctan2(moment[2, 0] - moment[0, 2], moment[0, 0] + moment[2, 2])
-    cos, sin = np.cos(angle), np.sin(angle)
-    turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
-    rotations, root = np.array(motion.rotations), np.asarray(motion.root)
-    rotations[:, 0] = turn @ rotations[:, 0]
-    turned = replace(motion, rotations=rotations, root=(root @ turn.T).astype(root.dtype))
-    return turned, float(np.rad2deg(angle))
 
 
 def check_pins(pins: Sequence[Pin], frames: int, fps: float) -> list[Pin]:

@@ -1,7 +1,7 @@
 """The style of a clip: its latents of a flow, and how they drive other speech (Stylized flow, ECCV 2022, Sec. 4.5).
 
 The paper puts the clip's latent of a frame in the place of the drawn one. That ends with the clip, and every sample is
-the same. Here latents are ``base_t + gain * drawn_t``, and a share ``w`` of style takes the place of what is drawn:
+the same. Here latents are ``mean_t + scale_t * drawn_t``, and a share ``w`` of style takes the place of what is drawn:
 
 - ``repeat``: ``w z_t + sqrt(1 - w^2) drawn_t``, with the clip's latents forwards and backwards in turn, so that
   neighbours stay neighbours. Share 1 is the paper's.
@@ -14,12 +14,12 @@ from frame to frame, as draws are; where those of a clip are slower, ``statistic
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.errors import InputError
+from a2g_jax.models.base import Latents
 
 MODES = ("repeat", "statistics")
 #: Sine of the angle between two means below which there is no arc from one to the other.
@@ -28,17 +28,17 @@ _NO_ARC = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """Latents of a clip, and how they are used."""
+    """Latents of a clip, and how they are mixed with drawn ones."""
 
     latents: Float[np.ndarray, "T C"]
     """Of :meth:`a2g_jax.generation.stylized_flow.latent_space.FlowSpace.encode`."""
     mode: str = "repeat"
     """``repeat`` or ``statistics``."""
     share: float = 1.0
-    """How much of the style there is, from 0 to 1."""
+    """Share of the style, from 0 to 1."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no style."""
+        """Refuse an unknown mode, a share out of range, and a clip without frames."""
         if self.mode not in MODES:
             raise InputError(f"no style mode {self.mode!r}; there are: {', '.join(MODES)}.")
         if not 0.0 <= self.share <= 1.0:
@@ -57,33 +57,26 @@ class Style:
         return self.latents.std(axis=0)
 
 
-class Drive(NamedTuple):
-    """What latents are made of: ``base_t + gain * drawn_t``."""
-
-    base: Float[np.ndarray, "T C"]
-    gain: Float[np.ndarray, " C"]
-
-
-def drive(style: Style | None, frames: int, channels: int) -> Drive:
-    """The latents of so many frames, apart from what is drawn for them; plain generation without a style.
+def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
+    """Mean and scale of the latents of so many frames; None, for drawn latents, without a style.
 
     Raises:
         InputError: a style of another number of channels.
     """
     if style is None:
-        return Drive(np.zeros((frames, channels), np.float32), np.ones(channels, np.float32))
+        return None
     if style.latents.shape[1] != channels:
         raise InputError(
             f"the style has {style.latents.shape[1]} channels, the run {channels}; encode the clip with this run."
         )
     rest = 1.0 - style.share**2
     if style.mode == "repeat":
-        base = style.share * style.latents[there_and_back(frames, len(style.latents))]
-        gain = np.full(channels, np.sqrt(rest))
+        mean = style.share * style.latents[there_and_back(frames, len(style.latents))]
+        scale = np.full(channels, np.sqrt(rest))
     else:
-        base = np.broadcast_to(style.share * style.mean, (frames, channels))
-        gain = np.sqrt(style.share**2 * style.std**2 + rest)
-    return Drive(np.asarray(base, np.float32), np.asarray(gain, np.float32))
+        mean = np.broadcast_to(style.share * style.mean, (frames, channels))
+        scale = np.sqrt(style.share**2 * style.std**2 + rest)
+    return Latents(np.asarray(mean, np.float32), np.tile(np.asarray(scale, np.float32), (frames, 1)))
 
 
 def there_and_back(frames: int, length: int) -> Int[np.ndarray, " frames"]:

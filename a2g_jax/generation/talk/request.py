@@ -84,7 +84,7 @@ def corpus_request(
         raise InputError(f"{path}: was not generated, so its truth is unknown; name a corpus of 'a2g prepare talker'.")
     if corpus.recipe.get("view", "body") != "body":
         raise InputError(f"{path}: shows its speakers as {corpus.recipe['view']}; prepare one without --view.")
-    corpus.require_pose("6d")
+    corpus.require_rotations()
     entry = _entry(corpus, name)
     roles = [*corpus.recipe.get("roles", ()), *corpus.later.get("stored", ())]
     role = next((role for role in roles if role["name"] == entry.name), None)

@@ -10,8 +10,6 @@ from flax import linen as nn
 from jaxtyping import Array, Float, Key
 
 from a2g_jax.features.dct import block_idct
-from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.networks import AudioEncoder, Decoder, Gaussian, MappingNet, MotionEncoder
 from a2g_jax.models.base import Data, Params
@@ -19,7 +17,7 @@ from a2g_jax.models.base import Data, Params
 
 @dataclass(frozen=True, eq=False)
 class Codec:
-    """The four networks with the pose representation between them and the body.
+    """The four networks with the pose space around them.
 
     Codes are in time, or in the DCT bands of consecutive blocks where the latent space is that of the DCT; decoding
     takes them in time: :meth:`to_time`.
@@ -66,10 +64,10 @@ class Codec:
         self, params: Params, pose: Float[Array, "B T R D"], dropout_key=None
     ) -> tuple[Gaussian, Gaussian | None]:
         """S_M and I_M; the latter is None where the code is not split."""
-        seen = self.data.pose_statistics.normalise(pose) if self.normalises else pose
+        values = self.data.pose_statistics.normalise(pose) if self.normalises else pose
         codes: tuple[Gaussian, Gaussian | None] = self._by_clip(
             lambda clips: _apply(self.modules[1], params["motion_encoder"], dropout_key, clips),
-            seen.reshape(*pose.shape[:2], -1),
+            values.reshape(*pose.shape[:2], -1),
         )
         return codes
 
@@ -99,26 +97,27 @@ class Codec:
 
     @property
     def normalises(self) -> bool:
-        """Whether networks see z-scores: by the settings, and always where poses are not in 6D."""
-        return self.config.normalise_pose or self.data.representation != "6d"
+        """Whether networks take z-scores: by the settings, and always where poses are not of unit scale."""
+        return self.config.normalise_pose or not self.data.space.unit_scale
 
-    def places(self, pose: Float[Array, "B T R D"]) -> tuple[Float[Array, "B T R 3 3"] | None, Float[Array, "B T R _"]]:
-        """Rotations and joint positions in metres, the root at the origin.
+    def positions(
+        self, pose: Float[Array, "B T R D"]
+    ) -> tuple[Float[Array, "B T R 3 3"] | None, Float[Array, "B T R _"]]:
+        """Rotations, and joint positions in metres with the root at the origin.
 
-        Where poses are no rotations (2D keypoints, bone directions): None and the values as z-scores, which have no
+        Where poses are no rotations (2D keypoints, bone directions): None, and the values as z-scores, which have no
         unit and are near 1 whatever the camera or the speaker.
         """
-        turns = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle}.get(self.data.representation)
-        if turns is None:
+        rotations = self.data.space.rotations(pose)
+        if rotations is None:
             return None, self.data.pose_statistics.normalise(pose)
-        rotations, skeleton = turns(pose), self.data.skeleton
-        return rotations, joint_positions(rotations, jnp.asarray(skeleton.offsets), skeleton.parents)
+        return rotations, self.data.space.joint_positions(rotations)
 
     def valid(
         self, pose: Float[Array, "B T R D"], rotations: Float[Array, "B T R 3 3"] | None
     ) -> Float[Array, "B T R D"]:
-        """In 6D the pose that the rotations stand for, instead of the raw output; other values as they are."""
-        return pose if rotations is None or self.data.representation != "6d" else matrix_to_6d(rotations)
+        """The pose that the rotations stand for, instead of the raw output; values without rotations as they are."""
+        return pose if rotations is None else self.data.space.valid(pose, rotations)
 
     def _by_clip(self, encode: Callable[[Array], Any], x: Float[Array, "B T C"]) -> Any:
         """The codes of each block encoded on its own, as in training, where blocks are transformed (Sec. 6.3)."""

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, fields
 
 from a2g_jax.errors import InputError
-from a2g_jax.models.audio2gestures.edits import parse_edit
-from a2g_jax.nn.noise import BLOCK
+from a2g_jax.nn.blocks import BLOCK
 
 
 @dataclass(frozen=True)
@@ -85,26 +84,6 @@ class Audio2GesturesConfig:
     diversity_decay_steps: int = 500_000
     """Steps over which the diversity weight falls linearly to zero; 0 for never."""
 
-    noise_frames: int = 1
-    """In generation, frames between draws of the noise that the mapping net is given; 1 for noise without memory, as
-    in the papers and in training.
-
-    The decoder averages noise without memory away; noise that changes every second makes samples differ more in what
-    they do next, and calmer. Trained with, it makes them differ less.
-    """
-    redraw_frames: int = 0
-    """In generation, frames after which the motion-specific code's statistics are drawn anew, with linear blending.
-
-    0 keeps one draw for the whole audio, as the authors do; then a hidden choice such as the hand tends to stay the
-    same throughout a long speech.
-    """
-    noise_scale: float = 1.0
-    """In generation, scale of the noise that becomes the specific code; lower is calmer, 1 is what training saw."""
-    sample_codes: bool = True
-    """In generation, draw codes from their posteriors, as the authors do; otherwise take their means (smoother)."""
-    edits: tuple[str, ...] = ()
-    """In generation, what is done to the codes' DCT bands: see :mod:`a2g_jax.models.audio2gestures.edits`."""
-
     def __post_init__(self) -> None:
         for name in ("audio_channels", "motion_channels", "decoder_channels"):
             channels = getattr(self, name)
@@ -131,10 +110,6 @@ class Audio2GesturesConfig:
         for name, known in (("backbone", ("tcn", "gru", "transformer")), ("latent", ("time", "dct"))):
             if getattr(self, name) not in known:
                 raise InputError(f"--{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}.")
-        if self.noise_frames < 1:
-            raise InputError(f"--noise-frames: expected 1 or more; got {self.noise_frames}.")
-        if self.latent == "dct" and self.noise_frames > 1:
-            raise InputError("--noise-frames: bands of the DCT have no order in time; use 1 with --latent dct.")
         if self.latent == "dct" and self.clip_frames % self.dct_points:
             raise InputError(
                 f"--clip-frames: expected a multiple of --dct-points {self.dct_points}; got {self.clip_frames}."
@@ -143,16 +118,11 @@ class Audio2GesturesConfig:
             raise InputError("--latent dct: needs --split true; the baseline has no DCT variant.")
         if self.latent == "dct" and BLOCK % self.dct_points:
             raise InputError(f"--dct-points: expected a divisor of {BLOCK}; got {self.dct_points}.")
-        for edit in self.edits:
-            if parse_edit(edit, self.dct_points).action == "swap":
-                raise InputError(f"edit {edit!r}: takes bands from another code, which only Python can give.")
         if not 0 <= self.dropout < 1:
             raise InputError(f"--dropout: expected 0 or more and below 1; got {self.dropout}.")
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name.endswith(("_weight", "_steps", "_threshold", "_scale", "_frames")) and not (
-                0 <= value < float("inf")
-            ):
+            if field.name.endswith(("_weight", "_steps", "_threshold", "_frames")) and not (0 <= value < float("inf")):
                 raise InputError(f"--{field.name.replace('_', '-')}: expected 0 or more; got {value}.")
 
 
@@ -176,7 +146,5 @@ PRESETS: dict[str, Audio2GesturesConfig] = {
         bicycle_weight=0.02,
         diversity_weight=0.02,
         diversity_decay_steps=0,
-        redraw_frames=128,
-        sample_codes=False,
     ),
 }

@@ -8,39 +8,11 @@ the paper. (The authors' code differs in places; the notes of each function say 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from a2g_jax.geometry.rotation import geodesic_distance
 from a2g_jax.models.audio2gestures.networks import Gaussian
-
-Positions = Float[Array, "B T J _"]
-
-
-def _joint_mean(per_joint: Float[Array, "B T J"], weights: Float[Array, " J"] | None) -> Float[Array, ""]:
-    if weights is None:
-        return jnp.mean(per_joint)
-    return jnp.mean(per_joint @ (weights / jnp.sum(weights)))
-
-
-def rotation_loss(
-    predicted: Float[Array, "B T J 3 3"],
-    target: Float[Array, "B T J 3 3"],
-    joint_weights: Float[Array, " J"] | None = None,
-) -> Float[Array, ""]:
-    """Mean geodesic angle between rotation matrices (Eq. 2), radians."""
-    return _joint_mean(geodesic_distance(predicted, target), joint_weights)
-
-
-def position_loss(
-    predicted: Positions, target: Positions, joint_weights: Float[Array, " J"] | None = None
-) -> Float[Array, ""]:
-    """Mean L1 distance of joint positions (Eq. 3), metres."""
-    return _joint_mean(jnp.sum(jnp.abs(predicted - target), axis=-1), joint_weights)
-
-
-def speed_loss(
-    predicted: Positions, target: Positions, joint_weights: Float[Array, " J"] | None = None
-) -> Float[Array, ""]:
-    """Mean L1 distance of joint velocities, ``v_t = p_{t+1} - p_t`` (Eq. 4), metres a frame."""
-    return position_loss(jnp.diff(predicted, axis=1), jnp.diff(target, axis=1), joint_weights)
+from a2g_jax.models.motion_losses import Positions as Positions
+from a2g_jax.models.motion_losses import position_loss as position_loss
+from a2g_jax.models.motion_losses import rotation_loss as rotation_loss
+from a2g_jax.models.motion_losses import speed_loss as speed_loss
 
 
 def alignment_loss(audio_code: Float[Array, "B T C"], motion_code: Float[Array, "B T C"]) -> Float[Array, ""]:

@@ -5,12 +5,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
+from a2g_jax.errors import InputError
 from a2g_jax.models.audio2gestures.codec import Codec as Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.networks import MAPPING_LAYERS, Gaussian
 from a2g_jax.models.audio2gestures.objective import check_objective, terms, total, weights
-from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
 from a2g_jax.nn.noise import blended_draws, frame_normal, slow_normal
 from a2g_jax.nn.tcn import receptive_halo
 
@@ -19,85 +21,106 @@ RECURRENT_REACH = 256
 
 Code = Float[Array, "1 T C"]
 
+#: Draws as in the papers.
+_PAPER = Audio2GesturesSampling()
 
-def build(config: Audio2GesturesConfig, data: Data) -> Model:
+
+def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSampling = _PAPER) -> Model:
     """Audio2Gestures for a body and an audio feature; see :class:`a2g_jax.models.base.Model` for its parts.
 
     Raises:
-        InputError: a loss needs what the corpus or the command did not give.
+        InputError: clips too short for a loss, or sampling settings that this latent space does not have.
     """
-    networks = Codec(config, data)
-    check_objective(networks)
+    codec = Codec(config, data)
+    check_objective(config)
+    check_sampling(config, sampling)
     weighted = weights(config)
 
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
         """Sum of weighted terms; each term is reported unweighted under its name."""
-        values = terms(networks, params, key, batch)
+        values = terms(codec, params, key, batch)
         return total(values, weighted(step)), values
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
         """Mean and standard deviation over time of the specific code of every clip in the batch."""
-        specific = networks.encode_motion(params, batch.pose)[1]
+        specific = codec.encode_motion(params, batch.pose)[1]
         if specific is None:
             return {}
-        code = networks.to_time(specific.sample(key))
+        code = codec.to_time(specific.sample(key))
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
-    def condition(params: Params, audio: Float[Array, "T bands"]) -> Gaussian:
+    def condition(params: Params, summary: Summary, given: Condition) -> Gaussian:
         """S_A of one audio."""
-        return networks.encode_audio(params, audio[None])
+        del summary
+        return codec.encode_audio(params, given.audio[None])
 
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], shared: Gaussian, start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
         """g(S_A, I_R), given what :func:`condition` returned."""
-        return networks.decode(params, *draw_codes(networks, params, summary, key, shared, start))[0]
+        return codec.decode(params, *draw_codes(codec, sampling, params, summary, key, shared, start))[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
         """g(S_M, I_M) with mean codes."""
-        shared, specific = networks.encode_motion(params, batch.pose)
-        time = networks.to_time
-        return networks.decode(params, time(shared.mean), None if specific is None else time(specific.mean))
+        shared, specific = codec.encode_motion(params, batch.pose)
+        time = codec.to_time
+        return codec.decode(params, time(shared.mean), None if specific is None else time(specific.mean))
 
     return Model(
         "audio2gestures",
         config,
         config.clip_frames,
         _halo(config),
-        networks.init,
-        loss,
+        codec.init,
+        (Stage((Update(loss),)),),
         summarise,
-        condition,
-        sample,
-        reconstruct,
+        needs_perceptual=config.lpips_weight > 0,
+        condition=condition,
+        sample=sample,
+        reconstruct=reconstruct,
     )
 
 
+def check_sampling(config: Audio2GesturesConfig, sampling: Audio2GesturesSampling) -> None:
+    """Refuse settings of generation that a latent space does not have.
+
+    Raises:
+        InputError: slow noise for DCT bands, or an edit that is none, or that needs another code.
+    """
+    if config.latent == "dct" and sampling.noise_frames > 1:
+        raise InputError("--noise-frames: bands of the DCT have no order in time; use 1 with a DCT latent space.")
+    for edit in sampling.all_edits:
+        if parse_edit(edit, config.dct_points).action == "swap":
+            raise InputError(f"--edit {edit!r}: takes bands from another code, which only Python can give.")
+
+
 def draw_codes(
-    networks: Codec,
+    codec: Codec,
+    sampling: Audio2GesturesSampling,
     params: Params,
     summary: Summary,
     key: Key[Array, ""],
     shared: Gaussian,
     start: Int[Array, ""],
 ) -> tuple[Code, Code | None]:
-    """S_A and I_R in time, with the edits of the settings: what generation decodes.
+    """S_A and I_R in time, edited: what generation decodes.
 
     Args:
+        sampling: settings of the draw and of the edits.
         shared: what ``condition`` returned.
         start: first frame of the window in the whole audio, a multiple of 128.
     """
-    config = networks.config
-    edits = [parse_edit(text, config.dct_points) for text in config.edits]
-    drawn = _draw(networks, params, summary, key, shared, start)
+    config = codec.config
+    edits = [parse_edit(text, config.dct_points) for text in sampling.all_edits]
+    drawn = _draw(codec, sampling, params, summary, key, shared, start)
 
     def edited(place: int, name: str) -> Code:
         def other(edit: Edit) -> Code:
             # A sample of another number than any that --samples makes.
             again = jax.random.fold_in(key, 2**31 + int(edit.value))
-            code: Code = _draw(networks, params, summary, again, shared, start)[place]
+            code: Code = _draw(codec, sampling, params, summary, again, shared, start)[place]
             return code
 
         chosen = [edit for edit in edits if edit.code == name]
@@ -108,28 +131,28 @@ def draw_codes(
     return edited(0, "shared"), None if drawn[1] is None else edited(1, "specific")
 
 
-def _draw(networks, params, summary, key, shared, start):
+def _draw(codec, sampling, params, summary, key, shared, start):
     """Codes before any edit; I_R from the mapping net, or from the standard normal where there is none."""
-    config = networks.config
+    config = codec.config
     frames, channels = shared.mean.shape[1:]
     which, noise_key, shared_key, code_key = jax.random.split(key, 4)
     audio_code = shared.mean
-    if config.sample_codes:
+    if sampling.sample_codes:
         audio_code = shared.shift(frame_normal(shared_key, start, frames, channels)[None])
-    audio_code = networks.to_time(audio_code)
+    audio_code = codec.to_time(audio_code)
     if not config.split:
         return audio_code, None
-    noise = config.noise_scale * slow_normal(noise_key, start, frames, channels, config.noise_frames)
+    noise = sampling.noise_scale * slow_normal(noise_key, start, frames, channels, sampling.noise_frames)
     if not config.mapping:
         return audio_code, noise[None]
     mean, std = blended_draws(
-        which, (summary["specific_mean"], summary["specific_std"]), start, frames, config.redraw_frames
+        which, (summary["specific_mean"], summary["specific_std"]), start, frames, sampling.redraw_frames
     )
-    mapped = networks.map_noise(params, (mean + std * noise)[None])
+    mapped = codec.map_noise(params, (mean + std * noise)[None])
     specific = mapped.mean
-    if config.sample_codes:
+    if sampling.sample_codes:
         specific = mapped.shift(frame_normal(code_key, start, frames, channels)[None])
-    return audio_code, networks.to_time(specific)
+    return audio_code, codec.to_time(specific)
 
 
 def _halo(config: Audio2GesturesConfig) -> int:

@@ -18,18 +18,12 @@ from a2g_jax.models.base import Params
 Terms = dict[str, Array]
 
 
-def check_objective(networks: Codec) -> None:
-    """Refuse settings that this corpus or feature network cannot serve.
+def check_objective(config: Audio2GesturesConfig) -> None:
+    """Refuse clips that a loss cannot be computed on.
 
     Raises:
-        InputError: no feature network for LPIPS, or clips shorter than a window of the STFT.
+        InputError: clips shorter than a window of the STFT.
     """
-    config = networks.config
-    if config.lpips_weight > 0 and networks.data.perceptual is None:
-        raise InputError(
-            "--lpips-weight: needs a feature network; train one with 'a2g train motion_autoencoder' on this corpus and"
-            " name it with --features."
-        )
     if config.stft_weight > 0 and config.clip_frames < 32:
         raise InputError(f"--stft-weight: needs clips of 32 frames or more; --clip-frames is {config.clip_frames}.")
 
@@ -77,30 +71,30 @@ def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"]) -> Float[Array,
     return mean + std * jax.random.normal(key, code.shape, code.dtype)
 
 
-def terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+def terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     """Every loss of one batch, unweighted, and figures that show degeneration early."""
-    return (_split_terms if networks.config.split else _joint_terms)(networks, params, key, batch)
+    return (_split_terms if codec.config.split else _joint_terms)(codec, params, key, batch)
 
 
-def _split_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
-    config = networks.config
+def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+    config = codec.config
     keys = jax.random.split(key, 10)
     drop = list(keys[6:]) if config.dropout > 0 else [None] * 4
     clips = batch.audio.shape[0]
 
-    audio_shared = networks.encode_audio(params, batch.audio, drop[0])
-    motion_shared, motion_specific = networks.encode_motion(params, batch.pose, drop[1])
+    audio_shared = codec.encode_audio(params, batch.audio, drop[0])
+    motion_shared, motion_specific = codec.encode_motion(params, batch.pose, drop[1])
     assert motion_specific is not None
-    s_audio = networks.to_time(audio_shared.sample(keys[0]))
-    s_motion = networks.to_time(motion_shared.sample(keys[1]))
-    i_motion = networks.to_time(motion_specific.sample(keys[2]))
+    s_audio = codec.to_time(audio_shared.sample(keys[0]))
+    s_motion = codec.to_time(motion_shared.sample(keys[1]))
+    i_motion = codec.to_time(motion_specific.sample(keys[2]))
 
     # Two random specific codes for every clip, mapped in one call.
     kl_specific = losses.kl_loss(motion_specific)
     if config.mapping:
         noise = jnp.concatenate([code_noise(keys[3], i_motion), code_noise(keys[4], i_motion)])
-        mapped = networks.map_noise(params, noise)
-        i_random = networks.to_time(mapped.sample(keys[5]))
+        mapped = codec.map_noise(params, noise)
+        i_random = codec.to_time(mapped.sample(keys[5]))
         kl_specific = kl_specific + losses.kl_loss(mapped)
     else:
         i_random = jax.random.normal(keys[5], (2 * clips, *i_motion.shape[1:]), i_motion.dtype)
@@ -108,24 +102,24 @@ def _split_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Ba
     # One large call decodes the four motions: reconstruction, audio to motion, and two random samples.
     shared = jnp.concatenate([s_motion, s_audio, s_audio, s_audio])
     specific = jnp.concatenate([i_motion, i_motion, i_random])
-    pose = networks.decode(params, shared, specific, drop[2])
-    rotations, places = networks.places(jnp.concatenate([batch.pose, pose]))
+    pose = codec.decode(params, shared, specific, drop[2])
+    rotations, places = codec.positions(jnp.concatenate([batch.pose, pose]))
     target, rebuilt, transferred, sampled, other = jnp.split(places, 5)
     turns = None if rotations is None else jnp.split(rotations, 5)
 
     # The re-encoded motion is a valid one: 6D of the rotation, not of the raw output.
-    random_pose = networks.valid(pose[2 * clips : 3 * clips], None if turns is None else turns[3])
-    recovered = networks.encode_motion(params, random_pose, drop[3])[1]
+    random_pose = codec.valid(pose[2 * clips : 3 * clips], None if turns is None else turns[3])
+    recovered = codec.encode_motion(params, random_pose, drop[3])[1]
     assert recovered is not None
 
-    values = _motion_terms(networks, batch.pose, pose[: 2 * clips], turns, target, [rebuilt, transferred])
+    values = _motion_terms(codec, batch.pose, pose[: 2 * clips], turns, target, [rebuilt, transferred])
     values |= {
         "alignment": losses.alignment_loss(s_audio, s_motion),
         **_shared_kl(config, audio_shared, motion_shared),
         "kl_specific": kl_specific,
         "relaxed": losses.relaxed_loss(sampled, target, config.relaxed_threshold),
         "sampled_speed": losses.speed_loss(sampled, target),
-        "bicycle": losses.bicycle_loss(jax.lax.stop_gradient(i_random[:clips]), networks.to_time(recovered.mean)),
+        "bicycle": losses.bicycle_loss(jax.lax.stop_gradient(i_random[:clips]), codec.to_time(recovered.mean)),
         "diversity": losses.diversity_loss(sampled, other),
     }
     if turns is not None:
@@ -133,25 +127,25 @@ def _split_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Ba
     # Not losses: how far codes and motions move. Near zero means that a code has collapsed.
     return values | {
         "reconstruction": losses.position_loss(rebuilt, target),
-        "shared_spread": jnp.mean(jnp.std(networks.to_time(audio_shared.mean), axis=1)),
+        "shared_spread": jnp.mean(jnp.std(codec.to_time(audio_shared.mean), axis=1)),
         "specific_spread": jnp.mean(jnp.std(motion_specific.mean, axis=(0, 1))),
     }
 
 
-def _joint_terms(networks: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
+def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     """Without a motion-specific code: reconstruction and alignment alone (Table 2, baseline)."""
-    config = networks.config
+    config = codec.config
     keys = jax.random.split(key, 5)
     drop = list(keys[2:]) if config.dropout > 0 else [None] * 3
-    audio_shared = networks.encode_audio(params, batch.audio, drop[0])
-    motion_shared, _ = networks.encode_motion(params, batch.pose, drop[1])
+    audio_shared = codec.encode_audio(params, batch.audio, drop[0])
+    motion_shared, _ = codec.encode_motion(params, batch.pose, drop[1])
     s_audio, s_motion = audio_shared.sample(keys[0]), motion_shared.sample(keys[1])
-    pose = networks.decode(params, jnp.concatenate([s_motion, s_audio]), None, drop[2])
-    rotations, places = networks.places(jnp.concatenate([batch.pose, pose]))
+    pose = codec.decode(params, jnp.concatenate([s_motion, s_audio]), None, drop[2])
+    rotations, places = codec.positions(jnp.concatenate([batch.pose, pose]))
     target, rebuilt, transferred = jnp.split(places, 3)
     turns = None if rotations is None else jnp.split(rotations, 3)
     return {
-        **_motion_terms(networks, batch.pose, pose, turns, target, [rebuilt, transferred]),
+        **_motion_terms(codec, batch.pose, pose, turns, target, [rebuilt, transferred]),
         "alignment": losses.alignment_loss(s_audio, s_motion),
         **_shared_kl(config, audio_shared, motion_shared),
         "reconstruction": losses.position_loss(rebuilt, target),
@@ -165,7 +159,7 @@ def _shared_kl(config: Audio2GesturesConfig, audio: Any, motion: Any) -> Terms:
 
 
 def _motion_terms(
-    networks: Codec,
+    codec: Codec,
     truth: Float[Array, "B T R D"],
     pose: Float[Array, "B2 T R D"],
     turns: list[Array] | None,
@@ -180,7 +174,7 @@ def _motion_terms(
         target: positions of the truth.
         made: of both.
     """
-    config = networks.config
+    config = codec.config
     both, twice = jnp.concatenate(made), jnp.concatenate([target, target])
     values = {"position": losses.position_loss(both, twice), "speed": losses.speed_loss(both, twice)}
     if turns is not None:
@@ -191,9 +185,9 @@ def _motion_terms(
     if config.ssim_weight > 0:
         values["ssim"] = 1.0 - jnp.mean(ssim(flat(both), flat(twice)))
     if config.lpips_weight > 0:
-        features = networks.data.perceptual
+        features = codec.data.perceptual
         assert features is not None
-        seen = networks.valid(pose, None if turns is None else jnp.concatenate(turns[1:3]))
-        ours, theirs = features(seen), features(truth)
+        valid = codec.valid(pose, None if turns is None else jnp.concatenate(turns[1:3]))
+        ours, theirs = features(valid), features(truth)
         values["lpips"] = jnp.mean(lpips(ours, [jnp.concatenate([block, block]) for block in theirs]))
     return values

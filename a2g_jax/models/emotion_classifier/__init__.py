@@ -1,6 +1,6 @@
-"""Classifiers that tell a clip's emotion from its motion or from its audio, for EmotionGesture's emotion accuracy."""
+"""Classifiers of a clip's emotion by its motion or its audio, for EmotionGesture's emotion accuracy."""
 
-from a2g_jax.models.emotion_classifier.config import PRESETS as PRESETS
-from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig as EmotionClassifierConfig
-from a2g_jax.models.emotion_classifier.model import build as build
-from a2g_jax.models.emotion_classifier.model import classify as classify
+from a2g_jax.models.emotion_classifier.config import PRESETS, EmotionClassifierConfig
+from a2g_jax.models.entry import Entry
+
+ENTRY = Entry(config=EmotionClassifierConfig, presets=PRESETS, build="a2g_jax.models.emotion_classifier.model:build")

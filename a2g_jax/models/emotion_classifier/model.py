@@ -11,12 +11,13 @@ from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
-from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models.base import Classifier, Data, Model, Params, Stage, Summary, Update
 from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
+from a2g_jax.models.entry import NO_SAMPLING, NoSampling
 from a2g_jax.nn.tcn import TCN, receptive_halo
 
 
-class Classifier(nn.Module):
+class ClipClassifier(nn.Module):
     """Residual blocks over time; mean and spread over the clip; two linear layers."""
 
     channels: Sequence[int]
@@ -30,9 +31,9 @@ class Classifier(nn.Module):
         x = TCN(self.channels, self.kernel_size, self.dropout)(x, deterministic)
         # The epsilon keeps the gradient of the root finite where a channel does not move.
         spread = jnp.sqrt(jnp.var(x, axis=1) + 1e-6)
-        seen = jnp.concatenate([jnp.mean(x, axis=1), spread], axis=-1)
-        seen = nn.Dropout(self.dropout)(nn.relu(nn.Dense(self.hidden)(seen)), deterministic=deterministic)
-        logits: Float[Array, "B K"] = nn.Dense(self.classes)(seen)
+        pooled = jnp.concatenate([jnp.mean(x, axis=1), spread], axis=-1)
+        hidden = nn.Dropout(self.dropout)(nn.relu(nn.Dense(self.hidden)(pooled)), deterministic=deterministic)
+        logits: Float[Array, "B K"] = nn.Dense(self.classes)(hidden)
         return logits
 
 
@@ -42,24 +43,25 @@ def classify(
     """Logits over ``data.emotions`` for every clip; dropout acts only when given a key."""
     network = _network(config, data)
     if config.input == "audio":
-        seen = batch.audio
+        values = batch.audio
     else:
-        seen = data.pose_statistics.normalise(batch.pose).reshape(*batch.pose.shape[:2], -1)
+        values = data.pose_statistics.normalise(batch.pose).reshape(*batch.pose.shape[:2], -1)
     rngs = None if dropout_key is None else {"dropout": dropout_key}
-    logits: Any = network.apply({"params": params}, seen, dropout_key is None, rngs=rngs)
+    logits: Any = network.apply({"params": params}, values, dropout_key is None, rngs=rngs)
     return logits
 
 
-def _network(config: EmotionClassifierConfig, data: Data) -> Classifier:
-    return Classifier(config.channels, config.hidden, config.kernel_size, config.dropout, len(data.emotions))
+def _network(config: EmotionClassifierConfig, data: Data) -> ClipClassifier:
+    return ClipClassifier(config.channels, config.hidden, config.kernel_size, config.dropout, len(data.emotions))
 
 
-def build(config: EmotionClassifierConfig, data: Data) -> Model:
+def build(config: EmotionClassifierConfig, data: Data, sampling: NoSampling = NO_SAMPLING) -> Model:
     """A classifier of a corpus's emotions; see :class:`a2g_jax.models.base.Model` for its parts.
 
     Raises:
         InputError: the corpus has fewer than two emotions.
     """
+    del sampling
     if len(data.emotions) < 2:
         raise InputError(
             f"emotion_classifier: the corpus has {len(data.emotions)} emotion ({', '.join(data.emotions) or 'none'});"
@@ -105,5 +107,13 @@ def build(config: EmotionClassifierConfig, data: Data) -> Model:
 
     halo = receptive_halo(len(config.channels), config.kernel_size)
     return Model(
-        "emotion_classifier", config, config.clip_frames, halo, init, loss, summarise, None, None, None, validation_loss
+        "emotion_classifier",
+        config,
+        config.clip_frames,
+        halo,
+        init,
+        (Stage((Update(loss),), validation_loss=validation_loss),),
+        summarise,
+        batch_fields=("audio", "pose", "emotion"),
+        classifier=Classifier(lambda params, batch: classify(config, data, params, batch), config.input),
     )

@@ -1,6 +1,6 @@
-"""The convolutional motion autoencoder whose features FID, LPIPS and the gesture perceptual loss look at."""
+"""A convolutional autoencoder of motion, whose features FID, LPIPS and the gesture perceptual loss compare."""
 
-from a2g_jax.models.motion_autoencoder.config import PRESETS as PRESETS
-from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig as MotionAutoencoderConfig
-from a2g_jax.models.motion_autoencoder.model import build as build
-from a2g_jax.models.motion_autoencoder.model import encode as encode
+from a2g_jax.models.entry import Entry
+from a2g_jax.models.motion_autoencoder.config import PRESETS, MotionAutoencoderConfig
+
+ENTRY = Entry(config=MotionAutoencoderConfig, presets=PRESETS, build="a2g_jax.models.motion_autoencoder.model:build")

@@ -9,10 +9,9 @@ from flax import linen as nn
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
-from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
-from a2g_jax.models.audio2gestures import losses
-from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models import motion_losses as losses
+from a2g_jax.models.base import Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.entry import NO_SAMPLING, NoSampling
 from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig
 from a2g_jax.nn.conv import Dense
 from a2g_jax.nn.tcn import TCN, ResidualBlock, receptive_halo
@@ -50,29 +49,29 @@ def encode(
 ) -> list[Float[Array, "B T _"]]:
     """Features of motion: the outputs of the encoder's blocks, differentiable with respect to the motion."""
     encoder = Encoder(config.encoder_channels, config.kernel_size)
-    seen = data.pose_statistics.normalise(pose).reshape(*pose.shape[:2], -1)
-    outputs: Any = encoder.apply({"params": params["encoder"]}, seen)
+    values = data.pose_statistics.normalise(pose).reshape(*pose.shape[:2], -1)
+    outputs: Any = encoder.apply({"params": params["encoder"]}, values)
     return outputs
 
 
-def build(config: MotionAutoencoderConfig, data: Data) -> Model:
+def build(config: MotionAutoencoderConfig, data: Data, sampling: NoSampling = NO_SAMPLING) -> Model:
     """The autoencoder for a corpus's poses; see :class:`a2g_jax.models.base.Model` for its parts."""
+    del sampling
     encoder = Encoder(config.encoder_channels, config.kernel_size)
     rows = data.pose_statistics.mean.shape
     width = rows[0] * rows[1]
     decoder = Decoder(config.decoder_channels, config.kernel_size, width)
-    turns = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle}.get(data.representation)
 
     def init(key: Key[Array, ""]) -> Params:
         keys = jax.random.split(key)
         pose, code = jnp.zeros((1, 8, width)), jnp.zeros((1, 8, config.encoder_channels[-1]))
         return {"encoder": encoder.init(keys[0], pose)["params"], "decoder": decoder.init(keys[1], code)["params"]}
 
-    def rebuild(params: Params, seen: Float[Array, "B T R D"]) -> Float[Array, "B T R D"]:
+    def rebuild(params: Params, values: Float[Array, "B T R D"]) -> Float[Array, "B T R D"]:
         """Normalised poses through the bottleneck and back."""
-        outputs: Any = encoder.apply({"params": params["encoder"]}, seen.reshape(*seen.shape[:2], -1))
-        values: Any = decoder.apply({"params": params["decoder"]}, outputs[-1])
-        return values.reshape(seen.shape)
+        outputs: Any = encoder.apply({"params": params["encoder"]}, values.reshape(*values.shape[:2], -1))
+        rebuilt: Any = decoder.apply({"params": params["decoder"]}, outputs[-1])
+        return rebuilt.reshape(values.shape)
 
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
@@ -80,20 +79,19 @@ def build(config: MotionAutoencoderConfig, data: Data) -> Model:
         """Motion reconstruction (Audio2Gestures, Eq. 1); for poses without rotations, L1 of values and of speeds."""
         del step
         target = data.pose_statistics.normalise(batch.pose)
-        seen = target
+        noisy = target
         if config.noise > 0:
-            seen = target + config.noise * jax.random.normal(key, target.shape, target.dtype)
-        rebuilt = rebuild(params, seen)
-        if turns is None:
+            noisy = target + config.noise * jax.random.normal(key, target.shape, target.dtype)
+        rebuilt = rebuild(params, noisy)
+        if not data.space.has_rotations:
             terms = {
                 "value": jnp.mean(jnp.abs(rebuilt - target)),
                 "speed": jnp.mean(jnp.abs(jnp.diff(rebuilt, axis=1) - jnp.diff(target, axis=1))),
             }
             return config.value_weight * terms["value"] + config.speed_weight * terms["speed"], terms
         poses = jnp.stack([data.pose_statistics.denormalise(rebuilt), batch.pose])
-        ours, theirs = rotations = turns(poses)
-        skeleton = data.skeleton
-        places = joint_positions(rotations, jnp.asarray(skeleton.offsets), skeleton.parents)
+        ours, theirs = rotations = data.space.rotations(poses)
+        places = data.space.joint_positions(rotations)
         terms = {
             "rotation": losses.rotation_loss(ours, theirs),
             "position": losses.position_loss(*places),
@@ -114,4 +112,14 @@ def build(config: MotionAutoencoderConfig, data: Data) -> Model:
         return back
 
     halo = receptive_halo(len(config.encoder_channels), config.kernel_size)
-    return Model("motion_autoencoder", config, config.clip_frames, halo, init, loss, summarise, None, None, reconstruct)
+    return Model(
+        "motion_autoencoder",
+        config,
+        config.clip_frames,
+        halo,
+        init,
+        (Stage((Update(loss),)),),
+        summarise,
+        reconstruct=reconstruct,
+        features=lambda params, pose: encode(config, data, params, pose),
+    )

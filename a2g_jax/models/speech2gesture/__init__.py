@@ -1,5 +1,6 @@
-"""Speech2Gesture: one motion for an audio, by regression and a GAN (Ginosar et al., CVPR 2019); a baseline."""
+"""Speech2Gesture (Ginosar et al. 2019), the deterministic baseline of Audio2Gestures' tables, with and without GAN."""
 
-from a2g_jax.models.speech2gesture.config import PRESETS as PRESETS
-from a2g_jax.models.speech2gesture.config import Speech2GestureConfig as Speech2GestureConfig
-from a2g_jax.models.speech2gesture.model import build as build
+from a2g_jax.models.entry import Entry
+from a2g_jax.models.speech2gesture.config import PRESETS, Speech2GestureConfig
+
+ENTRY = Entry(config=Speech2GestureConfig, presets=PRESETS, build="a2g_jax.models.speech2gesture.model:build")

@@ -7,24 +7,23 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
-from a2g_jax.geometry.kinematics import joint_positions
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
-from a2g_jax.models.audio2gestures import losses
-from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models import motion_losses as losses
+from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.entry import NO_SAMPLING, NoSampling
 from a2g_jax.models.speech2gesture.config import Speech2GestureConfig
 from a2g_jax.models.speech2gesture.networks import Discriminator, Translator, generator_halo
 
 
-def build(config: Speech2GestureConfig, data: Data) -> Model:
+def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SAMPLING) -> Model:
     """Speech2Gesture for a corpus's poses; see :class:`a2g_jax.models.base.Model` for its parts.
 
     It is deterministic: one audio has one motion, and all samples for it are equal.
     """
+    del sampling
     rows = data.pose_statistics.mean.shape
     width = rows[0] * rows[1]
     generator = Translator(config, width)
     discriminator = Discriminator(config.discriminator_channels, config.normalise)
-    turns = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle}.get(data.representation)
     adversarial = config.adversarial_weight > 0
 
     def init(key: Key[Array, ""]) -> Params:
@@ -41,7 +40,7 @@ def build(config: Speech2GestureConfig, data: Data) -> Model:
         return pose
 
     def motion(pose: Float[Array, "B T R D"]) -> Float[Array, "B T-1 D2"]:
-        """What the discriminator sees: differences of frames' z-scores."""
+        """Input of the discriminator: differences of frames' z-scores."""
         values = data.pose_statistics.normalise(pose)
         return jnp.diff(values.reshape(*values.shape[:2], -1), axis=1)
 
@@ -49,47 +48,48 @@ def build(config: Speech2GestureConfig, data: Data) -> Model:
         scores: Any = discriminator.apply({"params": params}, moved)
         return scores
 
-    def loss(
+    def regression(params: Params, batch: Batch) -> tuple[Float[Array, "B T R D"], dict[str, Array], dict[str, float]]:
+        """The generated poses as the discriminator takes them, and the terms of the regression with their weights."""
+        pose = generate(params, batch.audio)
+        rotations = data.space.rotations(jnp.stack([pose, batch.pose]))
+        if rotations is None:
+            return pose, *_value_terms(config, data, pose, batch.pose)
+        # The pose that the output stands for: the length of raw 6D vectors is nothing to judge.
+        return data.space.valid(pose, rotations[0]), *_rotation_terms(config, data, rotations)
+
+    def generator_loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """Regression, and where its weight is not zero the two sides of a least-squares GAN at once.
-
-        The authors take turns: a step of the discriminator, then one of the generator on another batch. Here one
-        gradient of the sum moves both at the same time, each by its own loss alone: the generator's ``adversarial``
-        term holds the discriminator's parameters still, the ``discriminator`` term the generated motion.
-        """
+        """Regression, and with a discriminator the generator's side of a least-squares GAN."""
         del key, step
-        pose = generate(params, batch.audio)
-        if turns is None:
-            terms, weights = _value_terms(config, data, pose, batch.pose)
-            shown = pose
-        else:
-            rotations = turns(jnp.stack([pose, batch.pose]))
-            terms, weights = _rotation_terms(config, data, rotations)
-            # The rotation that the output stands for: its length is nothing to judge.
-            shown = matrix_to_6d(rotations[0]) if data.representation == "6d" else pose
+        made, terms, weights = regression(params, batch)
         if adversarial:
-            fake, real = motion(shown), motion(batch.pose)
-            terms["adversarial"] = jnp.mean(
-                jnp.square(score(jax.lax.stop_gradient(params["discriminator"]), fake) - 1.0)
-            )
-            real_score, fake_score = jnp.split(
-                score(params["discriminator"], jnp.concatenate([real, jax.lax.stop_gradient(fake)])), 2
-            )
-            terms["discriminator"] = jnp.mean(jnp.square(real_score - 1.0)) + jnp.mean(jnp.square(fake_score))
-            weights |= {"adversarial": config.adversarial_weight, "discriminator": 1.0}
+            terms["adversarial"] = jnp.mean(jnp.square(score(params["discriminator"], motion(made)) - 1.0))
+            weights["adversarial"] = config.adversarial_weight
         # XLA keeps a product with a constant zero, and the whole gradient behind it: leave those terms out.
         total = sum((weights[name] * terms[name] for name in terms if weights[name] > 0), start=jnp.zeros(()))
         return total, terms
+
+    def discriminator_loss(
+        params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+    ) -> tuple[Float[Array, ""], dict[str, Array]]:
+        """The discriminator's side: 1 for true motion, 0 for generated."""
+        del key, step
+        made, _, _ = regression(params, batch)
+        both = jnp.concatenate([motion(batch.pose), motion(made)])
+        real_score, fake_score = jnp.split(score(params["discriminator"], both), 2)
+        loss = jnp.mean(jnp.square(real_score - 1.0)) + jnp.mean(jnp.square(fake_score))
+        return loss, {"discriminator": loss}
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
         """Nothing: there is no latent space."""
         del params, key, batch
         return {}
 
-    def condition(params: Params, audio: Float[Array, "T bands"]) -> Float[Array, "T R D"]:
+    def condition(params: Params, summary: Summary, given: Condition) -> Float[Array, "T R D"]:
         """The one motion of an audio."""
-        return generate(params, audio[None])[0]
+        del summary
+        return generate(params, given.audio[None])[0]
 
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], condition: Float[Array, "T R D"], start: Int[Array, ""]
@@ -102,17 +102,24 @@ def build(config: Speech2GestureConfig, data: Data) -> Model:
         """The motion of the batch's audio; its poses play no part."""
         return generate(params, batch.audio)
 
+    # In turns, as the authors train, each with its own optimiser; theirs take another batch for the second turn.
+    updates: tuple[Update, ...] = (Update(generator_loss),)
+    if adversarial:
+        updates = (
+            Update(discriminator_loss, ("discriminator",), "discriminator"),
+            Update(generator_loss, ("generator",), "generator"),
+        )
     return Model(
         "speech2gesture",
         config,
         config.clip_frames,
         generator_halo(config),
         init,
-        loss,
+        (Stage(updates),),
         summarise,
-        condition,
-        sample,
-        reconstruct,
+        condition=condition,
+        sample=sample,
+        reconstruct=reconstruct,
     )
 
 
@@ -120,8 +127,7 @@ def _rotation_terms(
     config: Speech2GestureConfig, data: Data, rotations: Float[Array, "2 B T J 3 3"]
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Angles, positions and velocities as in Audio2Gestures (Eq. 1), of ours and of the truth."""
-    skeleton = data.skeleton
-    places = joint_positions(rotations, jnp.asarray(skeleton.offsets), skeleton.parents)
+    places = data.space.joint_positions(rotations)
     terms = {
         "rotation": losses.rotation_loss(*rotations),
         "position": losses.position_loss(*places),

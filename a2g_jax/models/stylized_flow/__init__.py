@@ -1,5 +1,13 @@
 """Stylized flow (ECCV 2022) and its baseline MoGlow: an autoregressive normalising flow of poses."""
 
-from a2g_jax.models.stylized_flow.config import PRESETS as PRESETS
-from a2g_jax.models.stylized_flow.config import StylizedFlowConfig as StylizedFlowConfig
-from a2g_jax.models.stylized_flow.model import build as build
+from a2g_jax.models.entry import Entry
+from a2g_jax.models.stylized_flow.config import PRESETS, TRAINING_PRESETS, StylizedFlowConfig
+from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
+
+ENTRY = Entry(
+    config=StylizedFlowConfig,
+    presets=PRESETS,
+    build="a2g_jax.models.stylized_flow.model:build",
+    sampling=StylizedFlowSampling,
+    training=TRAINING_PRESETS,
+)

@@ -1,4 +1,4 @@
-"""What a frame is told of: the poses before it and the audio around it."""
+"""Conditioning of a frame: the poses before it and the audio around it."""
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,6 @@ def pose_history(x: Float[Array, "B T C"], history: int, after: int) -> Float[Ar
     return windows(x[:, : x.shape[1] - 1 - after], history)
 
 
-def hidden(key: Key[Array, ""], share: float, shape: tuple[int, int, int]) -> Bool[Array, "B N history"]:
-    """Which told poses stay seen when that share of them is hidden."""
+def pose_mask(key: Key[Array, ""], share: float, shape: tuple[int, int, int]) -> Bool[Array, "B N history"]:
+    """Mask of the conditioning poses that stay when a share of them is dropped (frame dropout)."""
     return jax.random.bernoulli(key, 1.0 - share, shape)

@@ -3,7 +3,10 @@
 from dataclasses import dataclass, fields, replace
 
 from a2g_jax.errors import InputError
-from a2g_jax.models.stylized_flow.controls import SCALES, parse_curves
+from a2g_jax.models.train_config import TrainConfig
+
+#: Style controls that :mod:`a2g_jax.models.stylized_flow.controls` measures.
+STYLE_CONTROLS = ("height", "left_height", "right_height", "speed", "radius")
 
 
 @dataclass(frozen=True)
@@ -21,13 +24,13 @@ class StylizedFlowConfig:
     exact_identity: bool = False
     """Whether couplings are the identity at first, as the paper says; the authors' scale by s(2) = 0.88."""
     history_frames: int = 5
-    """Poses that a frame is told of; its audio reaches as far back."""
+    """Poses before a frame in its conditioning; its audio reaches as far back."""
     lookahead_frames: int = 20
-    """Frames of audio after its own that a frame is told of."""
+    """Frames of audio after its own in the conditioning of a frame."""
     frame_dropout: float = 0.4
-    """Share of the told poses that are hidden in training, so that the audio is listened to."""
+    """Share of the conditioning poses that are masked in training, so that the audio matters."""
     input_noise: float = 0.02
-    """Standard deviation of the noise that likelihoods see poses through, in z-scores; 0 for none.
+    """Standard deviation of the noise on poses whose likelihood is taken, in z-scores; 0 for none.
 
     Channels that hardly move, or that follow from others as the six numbers of a rotation do, have a density without
     bound: the likelihood grows by fitting them alone, and its gradient with it. The noise bounds it; the papers name
@@ -36,7 +39,7 @@ class StylizedFlowConfig:
     predictor: bool = False
     """Whether the first layer subtracts a linear extrapolation of each channel and whitens what is left, fitted to the
     first batch: see :mod:`a2g_jax.nn.flow.predictor`. The published flows have none; without it a small flow of smooth
-    motion stays far behind a linear one for thousands of steps. It sees all poses whatever ``frame_dropout`` hides.
+    motion stays far behind a linear one for thousands of steps. ``frame_dropout`` masks none of its poses.
     """
     freedom: float = 50.0
     """Degrees of freedom of the Student-t prior; 0 for a normal one (MoGlow)."""
@@ -55,18 +58,14 @@ class StylizedFlowConfig:
     perceptual_weight: float = 0.0
     """Of the gesture perceptual loss (Eq. 8), 0.1 in the paper; needs ``a2g train --features RUN``."""
     style_controls: tuple[str, ...] = ()
-    """What a frame is told of how the hands move: any of height, left_height, right_height, speed and radius.
+    """Conditioning on the motion of the hands: any of height, left_height, right_height, speed and radius.
 
-    Averages of the clip's own poses over four seconds, never hidden. The likelihood is then that of poses given their
-    averages, which compares with no model that is not told them.
+    Averages of the clip's own poses over four seconds, never masked. The likelihood is then that of poses given their
+    averages, and compares with no model without them.
     """
     clip_frames: int = 120
-    """Frames in a training clip; the first ``history_frames`` and the last ``lookahead_frames`` are only told of."""
-    temperature: float = 1.0
-    """In generation, scale of the latents; 1 is what training saw."""
-    control_curves: tuple[str, ...] = ()
-    """In generation, what is asked of the style controls, as percentiles of the training clips: ``height=90``, or over
-    seconds ``height=10@0 90@5``; 50 for those that are not named."""
+    """Frames in a training clip; the first ``history_frames`` and the last ``lookahead_frames`` are conditioning
+    alone."""
 
     def __post_init__(self) -> None:
         for name in (
@@ -79,9 +78,10 @@ class StylizedFlowConfig:
             if getattr(self, name) < 0:
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
         for name in self.style_controls:
-            if name not in SCALES or self.style_controls.count(name) > 1:
-                raise InputError(f"--style-controls: expected any of {', '.join(SCALES)}, each once; got {name!r}.")
-        parse_curves(self.control_curves, self.style_controls)
+            if name not in STYLE_CONTROLS or self.style_controls.count(name) > 1:
+                raise InputError(
+                    f"--style-controls: expected any of {', '.join(STYLE_CONTROLS)}, each once; got {name!r}."
+                )
         if self.predictor and self.history_frames < 2:
             raise InputError(f"--predictor: needs --history-frames 2 or more; got {self.history_frames}.")
         if self.cell not in ("gru", "lstm"):
@@ -91,7 +91,7 @@ class StylizedFlowConfig:
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 to 1; got {getattr(self, name)}.")
         for field in fields(self):
             value = getattr(self, field.name)
-            bounded = field.name in ("freedom", "temperature", "input_noise") or field.name.endswith("_weight")
+            bounded = field.name in ("freedom", "input_noise") or field.name.endswith("_weight")
             if bounded and not 0 <= value < float("inf"):
                 raise InputError(f"--{field.name.replace('_', '-')}: expected 0 or more; got {value}.")
         if self.clip_frames <= self.history_frames + self.lookahead_frames:
@@ -102,7 +102,7 @@ class StylizedFlowConfig:
 
     @property
     def audio_frames(self) -> int:
-        """Frames of audio that a frame is told of."""
+        """Frames of audio in the conditioning of a frame."""
         return self.history_frames + 1 + self.lookahead_frames
 
     @property
@@ -136,5 +136,19 @@ PRESETS: dict[str, StylizedFlowConfig] = {
 for StyleGestures, apart from our ``input_noise``, which theirs lacks (``--input-noise 0``). ``moglow_styled``: the same
 with style controls, all in one model, and the height that of both hands; StyleGestures trains one model for each
 control, and its height is that of the right hand (``--style-controls right_height``). How each is trained:
-:data:`a2g_jax.models.train_config.MODEL_PRESETS`.
+:data:`TRAINING_PRESETS`.
 """
+
+#: Both flows clip gradients, and their learning rate rises and falls in the same way.
+_FLOW = TrainConfig(
+    steps=80_000, learning_rate=1.5e-3, schedule="noam", warmup_steps=3_000, clip_value=5.0, clip_norm=100.0
+)
+
+TRAINING_PRESETS: dict[str, TrainConfig] = {
+    "paper": replace(_FLOW, steps=30_000, batch_size=100),
+    "ted": replace(_FLOW, batch_size=200, learning_rate=1e-3),
+    "moglow": replace(_FLOW, batch_size=80),
+    "moglow_styled": replace(_FLOW, batch_size=80),
+    "tiny": replace(_FLOW, steps=4_000, batch_size=16, warmup_steps=200, checkpoint_every=500, validate_every=500),
+}
+"""The stylized flow's training (Sec. 4), and MoGlow's as its authors prefer it for StyleGestures."""

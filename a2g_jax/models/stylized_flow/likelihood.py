@@ -1,40 +1,43 @@
-"""How likely a motion is to the flow, frame by frame.
+"""The likelihood of a motion under the flow, frame by frame.
 
 A frame's density is that of its z-scores given the poses before it and the audio around it; over a clip the
-logarithms add up to that of the whole, since a frame's place depends on no later one (MoGlow, Eq. 5).
+logarithms add up to that of the whole, since the density of a frame depends on no later one (MoGlow, Eq. 5).
 
-Training shows poses through a little normal noise (``input_noise``), so the density learned is that of poses *plus
-noise*: the true one smeared by a normal distribution of that width. It is taken here at the pose itself, with the poses
-before it as they are: nothing is drawn, and the same motion always gets the same values. So a value tells how much mass
-the model puts around a pose, no nearer than the noise; where a channel never moves it stays bounded. At the pose itself
-such a channel counts half a nat more than the noisy poses of training do on average, so the mean over a held-out motion
-is a little above the log-likelihood that training reports: :func:`a2g_jax.evaluation.likelihood.bits_per_dim` has both.
+Poses have a little normal noise in training (``input_noise``), so the learned density is that of poses *plus noise*:
+the true one convolved with a normal distribution of that width. It is evaluated at the pose itself, with the poses
+before it as they are: nothing is drawn, and the same motion always gets the same values. So a value measures the
+probability mass around a pose, no finer than the noise; where a channel never moves it stays bounded. At the pose
+itself such a channel counts half a nat more than the noisy poses of training do on average, so the mean over a
+held-out motion is a little above the log-likelihood that training reports;
+:func:`a2g_jax.evaluation.likelihood.bits_per_dim` gives both.
 """
 
-from collections.abc import Callable
+from dataclasses import replace
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from a2g_jax.models.base import Params
-from a2g_jax.models.stylized_flow.networks import FlowNetworks, Told
+from a2g_jax.models.base import Density, Params
+from a2g_jax.models.stylized_flow.networks import Conditioning, FlowNetworks
 from a2g_jax.nn.flow.priors import log_prob
 
 
 def log_likelihood(
-    networks: FlowNetworks, params: Params, flat: Float[Array, "B T C"], told: Told
+    networks: FlowNetworks, params: Params, flat: Float[Array, "B T C"], given: Conditioning
 ) -> tuple[Float[Array, "B N"], Float[Array, "B N C"]]:
     """Log-density of each frame in nats, and the latents.
 
     Args:
-        flat: z-scores of whole clips, of which the frames with history and lookahead are looked at.
-        told: what those frames are told.
+        flat: z-scores of whole clips; the frames with history and lookahead are scored.
+        given: conditioning of those frames.
     """
-    z, log_det = networks.latents(params, networks.inner(flat), told)
+    z, log_det = networks.latents(params, networks.inner(flat), given)
     return log_prob(z, networks.config.freedom) + log_det, z
 
 
-def make_score(networks: FlowNetworks) -> Callable[..., Array]:
-    """The model's answer to ``score``: see :class:`a2g_jax.models.base.Model`."""
+def make_density(networks: FlowNetworks) -> Density:
+    """The model's density: see :class:`a2g_jax.models.base.Density`."""
+    config = networks.config
 
     def score(
         params: Params,
@@ -42,10 +45,21 @@ def make_score(networks: FlowNetworks) -> Callable[..., Array]:
         pose: Float[Array, "B T R D"],
         clean: Float[Array, "B T R D"] | None = None,
     ) -> Float[Array, "B N"]:
-        """Of the frames with history and lookahead; recurrent layers are at rest before the first of them."""
+        """Nats of the frames with history and lookahead; hidden states are zero before the first of them."""
         flat = networks.flat(pose)
         controls = None if clean is None else networks.controls(clean)
-        told = networks.told(params, audio, flat, controls=controls)
-        return log_likelihood(networks, params, flat, told)[0]
+        given = networks.conditioning(params, audio, flat, controls=controls)
+        return log_likelihood(networks, params, flat, given)[0]
 
-    return score
+    # The global feature is left out: it is a function of the rest.
+    plain = FlowNetworks(replace(config, global_channels=0, predictor=False), networks.data)
+
+    def conditioning(
+        audio: Float[Array, "B T bands"], pose: Float[Array, "B T R D"], clean: Float[Array, "B T R D"]
+    ) -> tuple[Float[Array, "B N D"], Float[Array, "B N C"]]:
+        """Pose history, audio window and style controls of the scored frames, and their z-scores."""
+        flat = plain.flat(pose)
+        given = plain.conditioning({}, audio, flat, controls=plain.controls(clean))
+        return jnp.concatenate([given.history, given.context], axis=-1), plain.inner(flat)
+
+    return Density(score, conditioning, config.history_frames, config.lookahead_frames, config.input_noise)

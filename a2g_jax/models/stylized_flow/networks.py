@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Key
 
-from a2g_jax.models.base import Data, Params, Summary
+from a2g_jax.models.base import Data, Latents, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, scaled
@@ -35,39 +35,41 @@ from a2g_jax.nn.flow.predictor import (
 )
 
 
-class Told(NamedTuple):
-    """What N frames of each clip are told."""
+class Conditioning(NamedTuple):
+    """Conditioning of N frames of each clip."""
 
     history: Float[Array, "B N H"]
     """Poses before them, and the global feature."""
-    known: Float[Array, "B N D"]
+    context: Float[Array, "B N D"]
     """Audio around them, and style controls."""
     poses: Float[Array, "B N frames C"]
-    """Poses before them with none hidden, for the linear first layer."""
+    """Poses before them without a mask, for the linear first layer."""
 
 
-class Heard(NamedTuple):
-    """What of the conditioning no pose has a part in, for T frames: computed before the scan over frames."""
+class AudioContext(NamedTuple):
+    """The share of the conditioning of T frames that depends on no pose, computed before the scan over frames."""
 
     projected: tuple[Array, ...]
     """For each step of the flow, (T, gates)."""
     embedding: Float[Array, "T E"]
     """Of the audio, for the global encoder; E is 0 without one."""
+    latents: Latents
+    """Mean and scale of the latents: 0 and 1 where they are drawn."""
 
 
-class Carried(NamedTuple):
-    """What goes from frame to frame in sampling."""
+class State(NamedTuple):
+    """State of sampling between frames."""
 
     history: Float[Array, "B history C"]
     """Normalised poses, the oldest first."""
     states: Any
-    """Of the recurrent layers."""
+    """Hidden states of the recurrent layers."""
 
 
 class Limits(NamedTuple):
-    """The range that each channel of training motion stays in, z-scores; poses made beyond it are drawn back.
+    """The range of each channel in training motion, z-scores; generated poses beyond it are drawn back.
 
-    Errors of a frame are carried into the next, and in minutes they add up in channels that hardly move, as in ankles.
+    Errors of a frame enter the next one, and in minutes they add up in channels that hardly move, as in ankles.
     """
 
     low: Float[Array, " C"]
@@ -125,35 +127,36 @@ class FlowNetworks:
         )
         return poses
 
-    def told(
+    def conditioning(
         self,
         params: Params,
         audio: Float[Array, "B T bands"],
         flat: Float[Array, "B T C"],
-        seen: Array | None = None,
+        mask: Array | None = None,
         controls: Float[Array, "B T K"] | None = None,
-    ) -> Told:
+    ) -> Conditioning:
         """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
 
         Args:
-            seen: which told poses are not hidden, (B, N, history); None for all.
+            mask: which conditioning poses stay, (B, N, history); None for all.
             controls: style controls of each frame, of :meth:`controls`; None for those that ``flat`` itself has.
         """
         config = self.config
         before = history = pose_history(flat, config.history_frames, config.lookahead_frames)
         if config.predictor:
             history = as_steps(params["predictor"], before)
-        if seen is not None:
-            history = history * seen[..., None]
-        heard = windows(audio, config.audio_frames)
+        if mask is not None:
+            history = history * mask[..., None]
+        stretches = windows(audio, config.audio_frames)
         poses = history.reshape(*history.shape[:2], -1)
         if config.global_channels:
-            embedded = [self.embed(params, "pose", history), self.embed(params, "audio", heard)]
+            embedded = [self.embed(params, "pose", history), self.embed(params, "audio", stretches)]
             poses = jnp.concatenate([poses, self.fuse(params, *embedded)], axis=-1)
         if controls is None:
             controls = self.controls(self.pose(flat))
-        known = [heard.reshape(*heard.shape[:2], -1), self.inner(scaled(self.config.style_controls, controls))]
-        return Told(poses, jnp.concatenate(known, axis=-1), before)
+        flat_audio = stretches.reshape(*stretches.shape[:2], -1)
+        context = [flat_audio, self.inner(scaled(self.config.style_controls, controls))]
+        return Conditioning(poses, jnp.concatenate(context, axis=-1), before)
 
     def controls(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T K"]:
         """Style controls of every frame of clips, metres and m/s; K is 0 without any."""
@@ -173,25 +176,25 @@ class FlowNetworks:
         return feature
 
     def inner(self, x: Float[Array, "B T C"]) -> Float[Array, "B N C"]:
-        """The frames of a clip that are told of all they need."""
+        """The frames of a clip that have the whole conditioning around them."""
         return x[:, self.config.history_frames : x.shape[1] - self.config.lookahead_frames]
 
     def latents(
-        self, params: Params, x: Float[Array, "B N C"], told: Told
+        self, params: Params, x: Float[Array, "B N C"], given: Conditioning
     ) -> tuple[Float[Array, "B N C"], Float[Array, "B N"]]:
         """Latents and log-determinants of frames."""
         if not self.config.predictor:
-            return glow(params["glow"], self.shape, x, told.history, told.known)
-        errors = predictor(params["predictor"], x, told.poses)
-        z, log_det = glow(params["glow"], self.shape, errors, told.history, told.known)
+            return glow(params["glow"], self.shape, x, given.history, given.context)
+        errors = predictor(params["predictor"], x, given.poses)
+        z, log_det = glow(params["glow"], self.shape, errors, given.history, given.context)
         return z, log_det + predictor_log_det(params["predictor"])
 
-    def motion(self, params: Params, z: Float[Array, "B N C"], told: Told) -> Float[Array, "B N C"]:
-        """Frames of latents, all at once, as the told poses are given."""
-        x = glow_inverse(params["glow"], self.shape, z, told.history, told.known)
+    def motion(self, params: Params, z: Float[Array, "B N C"], given: Conditioning) -> Float[Array, "B N C"]:
+        """Frames of latents, all at once, given the poses before them."""
+        x = glow_inverse(params["glow"], self.shape, z, given.history, given.context)
         if not self.config.predictor:
             return x
-        return predictor_inverse(params["predictor"], x, told.poses, inverse_whitening(params["predictor"]))
+        return predictor_inverse(params["predictor"], x, given.poses, inverse_whitening(params["predictor"]))
 
     def fitted(
         self,
@@ -200,30 +203,43 @@ class FlowNetworks:
         flat: Float[Array, "B T C"],
         controls: Float[Array, "B T K"] | None = None,
     ) -> Params:
-        """Actnorms and the linear first layer set from a batch; arguments of :meth:`told`."""
+        """Actnorms and the linear first layer set from a batch; arguments of :meth:`conditioning`."""
         x = self.inner(flat)
         if self.config.predictor:
             before = pose_history(flat, self.config.history_frames, self.config.lookahead_frames)
             params = {**params, "predictor": fit_predictor(x, before)}
             x = predictor(params["predictor"], x, before)
-        told = self.told(params, audio, flat, None, controls)
-        return {**params, "glow": fit_glow(params["glow"], self.shape, x, told.history, told.known)}
+        given = self.conditioning(params, audio, flat, None, controls)
+        return {**params, "glow": fit_glow(params["glow"], self.shape, x, given.history, given.context)}
 
-    def heard(self, params: Params, audio: Float[Array, "T bands"]) -> Heard:
-        """For every frame of an audio; before and after it there are zeros. Style controls: see :meth:`steered`."""
+    def audio_context(
+        self,
+        params: Params,
+        audio: Float[Array, "T bands"],
+        controls: Float[Array, "T K"] | None = None,
+        latents: Latents | None = None,
+    ) -> AudioContext:
+        """For every frame of an audio; before and after it there are zeros.
+
+        Args:
+            controls: style controls, metres and m/s; zeros if None.
+            latents: in place of drawn ones; drawn if None.
+        """
         config = self.config
         padded = jnp.pad(audio, ((config.history_frames, config.lookahead_frames), (0, 0)))[None]
         stretches = windows(padded, config.audio_frames)
-        known = jnp.pad(stretches.reshape(len(audio), -1), ((0, 0), (0, len(config.style_controls))))
+        context = jnp.pad(stretches.reshape(len(audio), -1), ((0, 0), (0, len(config.style_controls))))
         embedding = jnp.zeros((len(audio), 0))
         if config.global_channels:
             embedding = self.embed(params, "audio", stretches)[0]
-        return Heard(project(prepare(params["glow"]), known), embedding)
-
-    def steered(self, params: Params, heard: Heard, controls: Float[Array, "T K"]) -> Heard:
-        """The same frames told of style controls as well, metres and m/s; until then they are told zeros."""
-        share = project_last(prepare(params["glow"]), scaled(self.config.style_controls, controls))
-        return heard._replace(projected=tuple(a + b for a, b in zip(heard.projected, share, strict=True)))
+        projected = project(prepare(params["glow"]), context)
+        if controls is not None:
+            share = project_last(prepare(params["glow"]), scaled(config.style_controls, controls))
+            projected = tuple(a + b for a, b in zip(projected, share, strict=True))
+        if latents is None:
+            zeros = jnp.zeros((len(audio), self.channels))
+            latents = Latents(zeros, zeros + 1.0)
+        return AudioContext(projected, embedding, latents)
 
     @staticmethod
     def limits(summary: Summary) -> Limits | None:
@@ -234,20 +250,20 @@ class FlowNetworks:
             jnp.min(jnp.asarray(summary["pose_low"]), axis=0), jnp.max(jnp.asarray(summary["pose_high"]), axis=0)
         )
 
-    def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> Carried:
-        """Before the first frame of so many sequences.
+    def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> State:
+        """State before the first frame of so many sequences.
 
         Args:
-            seed: poses before it; the mean pose if None.
+            seed: z-scores of the poses before it; the mean pose if None.
         """
         shape = (count, self.config.history_frames, self.channels)
         history = jnp.zeros(shape) if seed is None else jnp.broadcast_to(seed[None], shape)
-        return Carried(history, first_states(prepare(params["glow"]), self.shape, count))
+        return State(history, first_states(prepare(params["glow"]), self.shape, count))
 
     def proceed(
-        self, params: Params, z: Float[Array, "T B C"], heard: Heard, carried: Carried, limits: Limits | None = None
-    ) -> tuple[Float[Array, "T B C"], Carried]:
-        """Frames of latents one after another, each told of those before it.
+        self, params: Params, z: Float[Array, "T B C"], given: AudioContext, state: State, limits: Limits | None = None
+    ) -> tuple[Float[Array, "T B C"], State]:
+        """Frames of latents one after another, each conditioned on those before it.
 
         Args:
             limits: of :meth:`limits`; None for none. Within them the frames are the latents' own.
@@ -256,22 +272,22 @@ class FlowNetworks:
         count = z.shape[1]
         unwhitening = inverse_whitening(params["predictor"]) if self.config.predictor else None
 
-        def frame(carried: Carried, one):
+        def frame(state: State, one):
             latent, projected, embedding = one
-            history, states = carried
+            history, hidden = state
             shown = as_steps(params["predictor"], history) if self.config.predictor else history
-            told = shown.reshape(count, -1)
+            poses = shown.reshape(count, -1)
             if self.config.global_channels:
                 audio = jnp.broadcast_to(embedding[None, None], (count, 1, embedding.shape[0]))
                 feature = self.fuse(params, self.embed(params, "pose", shown[:, None]), audio)
-                told = jnp.concatenate([told, feature[:, 0]], axis=-1)
-            known = tuple(jnp.broadcast_to(share[None], (count, share.shape[0])) for share in projected)
-            x, states = glow_inverse_step(prepared, self.shape, latent, told, known, states)
+                poses = jnp.concatenate([poses, feature[:, 0]], axis=-1)
+            context = tuple(jnp.broadcast_to(share[None], (count, share.shape[0])) for share in projected)
+            x, hidden = glow_inverse_step(prepared, self.shape, latent, poses, context, hidden)
             if unwhitening is not None:
                 x = predictor_inverse(params["predictor"], x, history, unwhitening)
             if limits is not None:
                 x = limits.kept(x)
-            return Carried(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), states), x
+            return State(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), hidden), x
 
-        after, x = jax.lax.scan(frame, carried, (z, heard.projected, heard.embedding))
+        after, x = jax.lax.scan(frame, state, (z, given.projected, given.embedding))
         return x, after

@@ -10,7 +10,7 @@ from datasets_ted_tree import made_up_clip, write_ted, write_videos
 from a2g_jax.data.datasets import ted, ted_expressive
 from a2g_jax.data.datasets.layouts import TED_EXPRESSIVE_LAYOUT, TED_LAYOUT
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_layout import resample_track
+from a2g_jax.geometry.pose_track import resample_track
 from tests.io.untrusted_checks import payloads
 from tests.io.untrusted_writers import arrow_payload, write_lmdb
 

@@ -1,0 +1,19 @@
+"""Motion files as clips for generation, on the skeleton of a run."""
+
+from pathlib import Path
+
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.onto import on_skeleton
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.npz import read_motion_npz
+
+
+def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
+    """Any humanoid BVH, or an NPZ that this package wrote, on a run's skeleton at its frame rate.
+
+    Raises:
+        InputError: a file that cannot be read, or a rig that is not understood.
+    """
+    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
+    return on_skeleton(motion, skeleton, fps, str(path))

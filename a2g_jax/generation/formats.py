@@ -1,0 +1,126 @@
+"""The table of output formats: one writer each, for generated motions and for the generated corpus alike.
+
+Importable without JAX: writers are imported when they write.
+"""
+
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import make_folder
+from a2g_jax.plugins import FORMATS as GROUP
+from a2g_jax.plugins import entry_points_of, load_entry_point, load_object
+
+if TYPE_CHECKING:
+    from a2g_jax.geometry.motion import Motion
+
+
+@dataclass(frozen=True)
+class MotionFormat:
+    """A format with a file for each motion."""
+
+    suffix: str
+    """Of its files, such as ``.bvh``."""
+    writer: str
+    """``module:function`` of ``write(path, motion)``, which writes a whole file or none."""
+
+    def write(self, path: Path, motion: "Motion") -> None:
+        """Write a motion."""
+        load_object(self.writer, "writer")(path, motion)
+
+
+#: The formats of this package by their names in ``--formats``.
+MOTION_FORMATS: dict[str, MotionFormat] = {
+    "bvh": MotionFormat(".bvh", "a2g_jax.io.bvh:write_bvh"),
+    "npz": MotionFormat(".npz", "a2g_jax.io.npz:write_motion_npz"),
+}
+#: The name of the page of all motions, which :func:`a2g_jax.viz.player.write_page` writes.
+PAGE = "html"
+#: Most joint positions that a page may hold: about 200 MB of HTML.
+_PAGE_LIMIT = 20_000_000
+
+
+def motion_formats() -> dict[str, MotionFormat]:
+    """The formats of this package, and those that other packages add in the entry-point group ``a2g_jax.formats``.
+
+    Raises:
+        InputError: another package's cannot be loaded.
+    """
+    found = dict(MOTION_FORMATS)
+    for name, point in entry_points_of(GROUP).items():
+        added = load_entry_point(point, "format")
+        if not isinstance(added, MotionFormat):
+            raise InputError(f"format {name!r} ({point.value}): expected a MotionFormat; got {type(added).__name__}.")
+        found.setdefault(name, added)
+    return found
+
+
+def chosen_formats(text: str, known: Sequence[str]) -> tuple[str, ...]:
+    """The formats in a comma-separated list.
+
+    Raises:
+        InputError: an empty list, or an unknown format.
+    """
+    formats = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",") if part.strip()))
+    unknown = [name for name in formats if name not in known]
+    if unknown or not formats:
+        reason = f"no format {unknown[0]!r}" if unknown else "the list is empty"
+        raise InputError(f"--formats: {reason}; the formats are {', '.join(known)}.")
+    return formats
+
+
+def check_page_size(motions: int, frames: int, joints: int) -> None:
+    """Refuse a page that no browser would open.
+
+    Raises:
+        InputError: too many joint positions.
+    """
+    if motions * frames * joints > _PAGE_LIMIT:
+        raise InputError(
+            f"a page of {motions} motions of {frames} frames would be too large for a browser;"
+            " reduce --samples or the length, or leave html out of --formats."
+        )
+
+
+class MotionFiles:
+    """The files of several motions in a folder: ``sample_00.bvh``, ``sample_00.npz``, ...
+
+    Files of an earlier call of the same names, which belong to another speech, are removed first.
+    """
+
+    def __init__(
+        self,
+        out: str | os.PathLike[str],
+        stem: str,
+        formats: Sequence[str],
+        others: str = "",
+        known: Mapping[str, MotionFormat] | None = None,
+    ) -> None:
+        """
+        Args:
+            stem: of the files' names.
+            formats: names of formats; those without a file for each motion are ignored.
+            others: a regular expression for further files that are replaced.
+            known: the formats; those of :func:`motion_formats` if None.
+
+        Raises:
+            InputError: a folder that cannot be used.
+        """
+        known = motion_formats() if known is None else known
+        self.folder = make_folder(out)
+        self._stem = stem
+        self._formats = {name: known[name] for name in formats if name in known}
+        suffixes = "|".join(re.escape(each.suffix) for each in known.values())
+        own = re.compile(rf"{stem}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
+        for old in self.folder.iterdir():
+            if own.fullmatch(old.name) and not old.is_dir():
+                old.unlink()
+
+    def write(self, number: int, motion: "Motion") -> None:
+        """The files of a motion."""
+        for each in self._formats.values():
+            each.write(self.folder / f"{self._stem}_{number:02d}{each.suffix}", motion)

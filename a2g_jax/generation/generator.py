@@ -1,0 +1,131 @@
+"""Motions for a speech of any length, from a trained run."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import log_mel
+from a2g_jax.generation.engine import WINDOW, Engine, Rows
+from a2g_jax.geometry.ground import plant_feet
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.models.base import Condition
+from a2g_jax.training.run import Run
+
+Audio = Float[np.ndarray, " N"]
+
+
+class Sampler(Protocol):
+    """Plain, edited, pinned and styled generation: different motions for one speech, one after another."""
+
+    def stream(self, audio: Audio, samples: int, seed: int = 0) -> Iterator[Motion]:
+        """Sample k depends on the audio, the run, the seed and k alone."""
+        ...
+
+
+class Generator:
+    """A run ready to generate for any audio; settings of generation are those of ``run.config``."""
+
+    def __init__(self, run: Run, window: int = WINDOW) -> None:
+        """
+        Args:
+            window: frames of one call of a compiled function, a multiple of 128.
+
+        Raises:
+            InputError: the run's model does not generate motion from audio.
+        """
+        self.run = run
+        self.engine = Engine(run, window)
+
+    def frames(self, audio: Audio) -> int:
+        """Length of the motion for an audio: its seconds times fps, rounded."""
+        return audio_frames(self.run, audio)
+
+    def generate(
+        self,
+        audio: Audio,
+        samples: int,
+        seed: int = 0,
+        report: Callable[[int], None] = lambda done: None,
+        **given: Any,
+    ) -> list[Motion]:
+        """Different motions for the same speech.
+
+        Sample k depends on the audio, the run, the seed and k alone, not on how many samples are requested.
+
+        Args:
+            audio: mono, at the run's sample rate.
+            samples: how many.
+            seed: of everything random.
+            report: called with the number of samples done.
+            given: further fields of :class:`~a2g_jax.models.base.Condition` that the model uses.
+
+        Raises:
+            InputError: the audio is shorter than a frame, or conditioning that the model does not use.
+        """
+        motions = []
+        for number, motion in enumerate(self.stream(audio, samples, seed, **given), start=1):
+            motions.append(motion)
+            report(number)
+        return motions
+
+    def stream(self, audio: Audio, samples: int, seed: int = 0, **given: Any) -> Iterator[Motion]:
+        """:meth:`generate`, one motion at a time."""
+        features = speech_features(self.run, audio)
+        if "waveform" in self.engine.model.condition_fields:
+            given.setdefault("waveform", np.asarray(audio, np.float32))
+        yield from self.stream_features(features, samples, seed, **given)
+
+    def stream_features(
+        self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0, **given: Any
+    ) -> Iterator[Motion]:
+        """:meth:`stream` for log-mel features, one row a frame, not normalised.
+
+        Raises:
+            InputError: the run generates keypoints or directions, which are no motion of a skeleton; see :meth:`rows`.
+        """
+        _ = self.run.config.skeleton
+        for rows in self.rows(features, samples, seed, **given):
+            yield stand(self.run, rows)
+
+    def rows(self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0, **given: Any) -> Iterator[Rows]:
+        """Different motions in the run's pose space, for log-mel features, not normalised."""
+        yield from self.engine.rows(Condition(audio=features, **given), samples, seed)
+
+
+def audio_frames(run: Run, audio: Audio) -> int:
+    """Length of a run's motion for an audio: its seconds times fps, rounded."""
+    return round(len(audio) / run.config.mel.sample_rate * run.config.fps)
+
+
+def speech_features(run: Run, audio: Audio) -> Float[np.ndarray, "T bands"]:
+    """Log-mel features of speech at a run's frames, not normalised.
+
+    Raises:
+        InputError: the audio is shorter than a frame.
+    """
+    frames = audio_frames(run, audio)
+    if frames == 0:
+        raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
+    return log_mel(audio, run.config.mel, run.config.fps, frames)
+
+
+def stand(run: Run, rows: Rows) -> Motion:
+    """The motion of poses of a run, with a root that plants the feet.
+
+    Raises:
+        InputError: the run generates keypoints or directions.
+    """
+    _ = run.config.skeleton
+    return stand_rotations(run, rotations_from_rows(rows, run.config.space.kind))
+
+
+def stand_rotations(run: Run, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
+    """The motion of local rotations, with a root that plants the feet as in the run's mean pose."""
+    config = run.config
+    still = Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps)
+    mean_pose = config.space.mean_rotations(config.statistics["pose"].mean)
+    return plant_feet(still, np.asarray(config.statistics["root"].mean), mean_pose)

@@ -1,0 +1,59 @@
+"""Settings of generation with Audio2Gestures; they can change without touching a trained run."""
+
+from dataclasses import dataclass, field
+
+from a2g_jax.errors import InputError
+
+
+@dataclass(frozen=True)
+class Audio2GesturesSampling:
+    """How codes are drawn and edited; the defaults are the papers'."""
+
+    noise_scale: float = 1.0
+    """Scale of the noise that becomes the specific code: lower is calmer, 1 is the scale of training."""
+    noise_frames: int = 1
+    """Frames between draws of the noise that enters the mapping net; 1 for independent frames, as in the papers and in
+    training.
+
+    The decoder averages independent noise away; noise that changes every second makes samples differ more in the
+    following gestures, and calmer. Trained with, it makes them differ less.
+    """
+    redraw_frames: int = 0
+    """Frames after which the motion-specific code's statistics are redrawn, with linear blending.
+
+    0 keeps one draw for the whole audio, as the authors do; then a hidden choice such as the hand tends to stay the
+    same throughout a long speech.
+    """
+    sample_codes: bool = True
+    """Whether codes are drawn from their posteriors, as the authors do; otherwise their means are used (smoother)."""
+    keep_shared: int | None = None
+    """Lowest DCT bands of the shared code that are kept, before other edits; none for all."""
+    keep_specific: int | None = None
+    """Lowest DCT bands of the specific code that are kept, before other edits; none for all."""
+    edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
+    """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5'; may be repeated."""
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.noise_frames < 1:
+            raise InputError(f"--noise-frames: expected 1 or more; got {self.noise_frames}.")
+        if self.redraw_frames < 0:
+            raise InputError(f"--redraw-frames: expected 0 or more; got {self.redraw_frames}.")
+        if not 0 <= self.noise_scale < float("inf"):
+            raise InputError(f"--noise-scale: expected 0 or more; got {self.noise_scale}.")
+        for name in ("keep_shared", "keep_specific"):
+            value = getattr(self, name)
+            if value is not None and value < 0:
+                raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {value}.")
+
+    @property
+    def all_edits(self) -> tuple[str, ...]:
+        """The edits as lines of :mod:`a2g_jax.models.audio2gestures.edits`, bands that are kept first."""
+        kept = (("shared", self.keep_shared), ("specific", self.keep_specific))
+        return (*(f"{name} keep {count}" for name, count in kept if count is not None), *self.edits)
+
+
+#: By preset; the papers' where a preset is not named.
+SAMPLING_PRESETS: dict[str, Audio2GesturesSampling] = {
+    "tiny": Audio2GesturesSampling(redraw_frames=128, sample_codes=False),
+}

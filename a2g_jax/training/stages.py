@@ -1,0 +1,48 @@
+"""The stages of a training on the common count of steps."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from a2g_jax.errors import InputError
+from a2g_jax.models.base import Model, Stage
+from a2g_jax.models.train_config import TrainConfig
+
+
+class StageSpan(NamedTuple):
+    """A stage and its steps of the run."""
+
+    stage: Stage
+    first: int
+    """Step of the run at which it begins."""
+    config: TrainConfig
+    """The training's settings with the stage's own number of steps, for schedules."""
+
+    @property
+    def stop(self) -> int:
+        """Step of the run after its last."""
+        return self.first + self.config.steps
+
+
+def stage_spans(model: Model, config: TrainConfig) -> tuple[StageSpan, ...]:
+    """The stages one after another.
+
+    Raises:
+        InputError: stages of one name, more than one without a number of steps, or parameters that do not exist.
+    """
+    names = [stage.name for stage in model.stages]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"{model.name}: expected stages of different names; got {', '.join(names) or 'none'}.")
+    if sum(stage.steps is None for stage in model.stages) > 1:
+        raise InputError(f"{model.name}: expected a number of steps for all stages but one.")
+    spans: list[StageSpan] = []
+    first = 0
+    for stage in model.stages:
+        steps = config.steps if stage.steps is None else stage.steps
+        spans.append(StageSpan(stage, first, replace(config, steps=steps)))
+        first += steps
+    return tuple(spans)
+
+
+def span_at(spans: tuple[StageSpan, ...], step: int) -> StageSpan:
+    """The stage that a step (counted from 0) belongs to; the last one after the end."""
+    return next((span for span in spans if step < span.stop), spans[-1])
