@@ -18,24 +18,8 @@ from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.npz import write_motion_npz
 from a2g_jax.training.run import Run
 
-FORMATS = ("bvh", "npz", "html")
 #: Most joint positions that a page may hold: about 200 MB of HTML.
 _PAGE_LIMIT = 20_000_000
-
-
-def check_formats(text: str) -> tuple[str, ...]:
-    """The formats in a comma-separated list.
-
-    Raises:
-        InputError: none, or one that is not known.
-    """
-    formats = tuple(part.strip().lower() for part in text.split(",") if part.strip())
-    for name in formats:
-        if name not in FORMATS:
-            raise InputError(f"--formats: no format {name!r}; there are: {', '.join(FORMATS)}.")
-    if not formats:
-        raise InputError(f"--formats: name at least one of {', '.join(FORMATS)}.")
-    return formats
 
 
 def deliver(
@@ -45,7 +29,7 @@ def deliver(
     *,
     samples: int,
     seed: int,
-    formats: str,
+    formats: Sequence[str],
     title: str,
     words: Sequence[Word] = (),
     pins: Pins | None = None,
@@ -56,7 +40,7 @@ def deliver(
 
     Args:
         audio: mono, at the run's sample rate.
-        formats: comma-separated; see :func:`check_formats`.
+        formats: any of :data:`a2g_jax.generation.formats.FORMATS`.
         title: what was spoken, for the page's heading.
         pins: clips that are pinned to moments of every sample; not with ``styling``.
         styling: clips whose style every sample takes on, or that it goes on from.
@@ -66,17 +50,16 @@ def deliver(
         How many files of each format were written.
 
     Raises:
-        InputError: unknown format, a folder that cannot be used, audio shorter than a frame, too large a page, or clips
+        InputError: a folder that cannot be used, audio shorter than a frame, too large a page, or clips
             that cannot be used.
     """
     from a2g_jax.viz.player import Figure, write_page
 
-    kinds = check_formats(formats)
     generator = Generator(run)
     pinned = None if pins is None else pins.place(run, generator.frames(audio))
     styled = None if styling is None else styling.place(run, samples)
     frames, joints = generator.frames(audio), run.config.skeleton.joints
-    if "html" in kinds and samples * frames * joints > _PAGE_LIMIT:
+    if "html" in formats and samples * frames * joints > _PAGE_LIMIT:
         raise InputError(
             f"a page of {samples} motions of {frames} frames would be too large for a browser;"
             " ask for fewer --samples, or for --formats bvh,npz."
@@ -95,11 +78,11 @@ def deliver(
     else:
         motions = generator.stream(audio, samples, seed)
     for number, motion in enumerate(motions):
-        if "bvh" in kinds:
+        if "bvh" in formats:
             write_bvh(out / f"sample_{number:02d}.bvh", motion)
-        if "npz" in kinds:
+        if "npz" in formats:
             write_motion_npz(out / f"sample_{number:02d}.npz", motion)
-        if "html" in kinds:
+        if "html" in formats:
             figures.append(Figure(motion=motion, label=f"sample {number}"))
         report(number + 1)
     if pinned is not None:
@@ -116,4 +99,4 @@ def deliver(
             words=words,
             lanes=() if pinned is None else (pinned.lane(),),
         )
-    return {kind: 1 if kind == "html" else samples for kind in kinds}
+    return {kind: 1 if kind == "html" else samples for kind in formats}

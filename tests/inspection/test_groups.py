@@ -15,7 +15,7 @@ from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack
-from a2g_jax.inspection.command import inspect
+from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh
 

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -23,24 +23,9 @@ from a2g_jax.talker.styles import gesture_style
 from a2g_jax.talker.transcript import speech_tiers
 from a2g_jax.talker.truth import GestureTruth
 
-TALK_FORMATS = ("wav", "textgrid", "json", "bvh", "npz", "html")
 #: Most joint positions that a page may hold: about 200 MB of HTML.
 _PAGE_LIMIT = 20_000_000
 _OWN = r"speech\.(wav|TextGrid|json)|motion_\d\d+\.(bvh|npz)|truth_\d\d+\.json|index\.html"
-
-
-def check_talk_formats(text: str) -> tuple[str, ...]:
-    """The formats in a comma-separated list.
-
-    Raises:
-        InputError: none, or one that is not known.
-    """
-    formats = tuple(part.strip().lower() for part in text.split(",") if part.strip())
-    unknown = [name for name in formats if name not in TALK_FORMATS]
-    if unknown or not formats:
-        what = f"no format {unknown[0]!r}" if unknown else "names none"
-        raise InputError(f"--formats: {what}; there are: {', '.join(TALK_FORMATS)}.")
-    return formats
 
 
 def right_motions(recording: Recording, samples: int, seed: int) -> Iterator[tuple[Motion, GestureTruth]]:
@@ -59,7 +44,7 @@ def deliver_talk(
     *,
     request: TalkRequest,
     samples: int,
-    formats: str,
+    formats: Sequence[str],
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
     """Write a generated recording with several right motions; what an earlier run left is replaced.
@@ -78,20 +63,19 @@ def deliver_talk(
         out: folder, made if needed; files of other names in it stay.
         request: what was asked for: the seed of the draws, and the view.
         samples: how many motions.
-        formats: comma-separated; see :func:`check_talk_formats`.
+        formats: any of :data:`a2g_jax.generation.formats.TALK_FORMATS`.
         report: called with the number of motions done.
 
     Returns:
         How many files of each format were written.
 
     Raises:
-        InputError: unknown format, a folder that cannot be used, or too large a page.
+        InputError: a folder that cannot be used, or too large a page.
     """
     from a2g_jax.generation.talk.page import write_talk_page
 
-    kinds = check_talk_formats(formats)
     plan = plan_from_json(recording.annotations["speech"])
-    if "html" in kinds and samples * recording.motion.frames * recording.motion.skeleton.joints > _PAGE_LIMIT:
+    if "html" in formats and samples * recording.motion.frames * recording.motion.skeleton.joints > _PAGE_LIMIT:
         raise InputError(
             f"a page of {samples} motions of {recording.motion.frames} frames would be too large for a browser;"
             " ask for fewer --samples or --seconds, or leave html out of --formats."
@@ -100,28 +84,28 @@ def deliver_talk(
     for old in out.iterdir():
         if re.fullmatch(_OWN, old.name) and not old.is_dir():
             old.unlink()
-    if "wav" in kinds:
+    if "wav" in formats:
         write_audio(out / "speech.wav", recording.audio, recording.sample_rate)
-    if "textgrid" in kinds:
+    if "textgrid" in formats:
         write_words(out / "speech.TextGrid", recording.words, plan.seconds, tiers=speech_tiers(plan))
-    if "json" in kinds:
+    if "json" in formats:
         write_json(out / "speech.json", {**_made(recording, request), "plan": asdict(plan)})
     shown = []
     for number, (body, truth) in enumerate(right_motions(recording, samples, request.seed)):
         motion = request.seen(body)
-        if "bvh" in kinds:
+        if "bvh" in formats:
             write_bvh(out / f"motion_{number:02d}.bvh", motion)
-        if "npz" in kinds:
+        if "npz" in formats:
             write_motion_npz(out / f"motion_{number:02d}.npz", motion)
-        if "json" in kinds:
+        if "json" in formats:
             write_json(out / f"truth_{number:02d}.json", _truth(recording, motion, truth, number, request))
-        if "html" in kinds:
+        if "html" in formats:
             shown.append((motion, truth))
         report(number + 1)
     if shown:
         write_talk_page(out / "index.html", recording, shown)
     each = {"json": 1 + samples, "bvh": samples, "npz": samples}
-    return {kind: each.get(kind, 1) for kind in kinds}
+    return {kind: each.get(kind, 1) for kind in formats}
 
 
 def _made(recording: Recording, request: TalkRequest) -> dict[str, Any]:
