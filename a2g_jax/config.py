@@ -3,7 +3,8 @@
 import dataclasses
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any, TypeVar
 
 from a2g_jax.errors import InputError
@@ -34,6 +35,66 @@ def parse_text(cls: type[Any], name: str, text: str) -> Any:
     kind = typing.get_type_hints(cls)[name]
     flag = "--" + name.replace("_", "-")
     return _parse(text, kind, flag)
+
+
+def flag_of(field: dataclasses.Field[Any]) -> str:
+    """The command-line flag of a setting: its name, unless its metadata give another ``flag``."""
+    return "--" + str(field.metadata.get("flag", field.name)).replace("_", "-")
+
+
+def parse_flags(pairs: Sequence[str], *owners: Any, hint: str) -> tuple[Any, ...]:
+    """Settings changed by flags such as ``["--learning-rate", "3e-4"]``.
+
+    Fields whose metadata have ``repeat`` take one element of a tuple with each flag.
+
+    Args:
+        owners: dataclass instances; a flag belongs to the first one with such a setting.
+        hint: the command that lists the flags, for the error.
+
+    Returns:
+        The owners with the values of the flags.
+
+    Raises:
+        InputError: an unknown flag, or a value that does not fit it.
+    """
+    known = {
+        flag_of(field): (number, field)
+        for number, owner in reversed(list(enumerate(owners)))
+        for field in fields(owner)
+    }
+    changes: list[dict[str, Any]] = [{} for _ in owners]
+    rest = list(pairs)
+    while rest:
+        text = rest.pop(0)
+        if not text.startswith("--"):
+            raise InputError(f"unexpected argument {text!r}; settings are written --name value.")
+        flag, equals, value = text.partition("=")
+        if flag not in known:
+            raise InputError(f"no setting {flag}; {hint} lists them.")
+        number, field = known[flag]
+        if not equals:
+            if rest and not rest[0].startswith("--"):
+                value = rest.pop(0)
+            elif isinstance(getattr(owners[number], field.name), bool):
+                value = "true"
+            else:
+                raise InputError(f"{flag}: needs a value.")
+        mine = changes[number]
+        if field.metadata.get("repeat"):
+            mine[field.name] = (*mine.get(field.name, ()), value)
+        else:
+            mine[field.name] = parse_text(type(owners[number]), field.name, value)
+    return tuple(dataclasses.replace(owner, **mine) for owner, mine in zip(owners, changes, strict=True))
+
+
+def settings_lines(settings: Any) -> list[str]:
+    """A line for each setting: its flag and value."""
+    lines = []
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        text = ",".join(map(str, value)) if isinstance(value, tuple) else value
+        lines.append(f"{flag_of(field)} {text}")
+    return lines
 
 
 def _parse(text: str, kind: Any, flag: str) -> Any:

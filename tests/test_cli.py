@@ -4,19 +4,25 @@ import json
 import subprocess
 import sys
 import wave
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.cli import main
+from a2g_jax.cli.paths import existing_corpus, existing_file, existing_report, existing_run
 from a2g_jax.compilations import drop_unfinished
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
+from a2g_jax.evaluation.report import read_report
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.audio import write_audio
+from a2g_jax.io.audio import read_audio, write_audio
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.talker.recordings import talk
+from a2g_jax.training.run import load_run
 
 SMALL = ["--audio-channels", "8,8", "--motion-channels", "8,8", "--decoder-channels", "8,8", "--clip-frames", "16"]
 
@@ -33,17 +39,108 @@ def fails(capsys, *arguments: str) -> str:
     return error[0]
 
 
-def test_help_is_quick_and_complete():
-    shown = subprocess.run([sys.executable, "-m", "a2g_jax.cli", "--help"], capture_output=True, text=True, check=True)
-    for command in ("demo", "prepare", "train", "generate"):
-        assert command in shown.stdout
-    modules = subprocess.run(
-        [sys.executable, "-c", "import a2g_jax.cli, sys; a2g_jax.cli.make_parser(); print('jax' in sys.modules)"],
-        capture_output=True,
-        text=True,
-        check=True,
+COMMANDS = ("demo", "talk", "prepare", "train", "inspect", "evaluate", "retarget", "generate")
+
+#: Arguments that are refused before JAX or NumPy is imported, and the message. The files that exist are empty.
+REFUSED_EARLY = {
+    "demo --nonsense": "unknown argument --nonsense",
+    "demo --audio no.wav": "no.wav: there is no such file; check the path.",
+    "demo --formats gif": "no format 'gif'; there are: bvh, npz, html",
+    "talk --out o --corpus no": "no: is not a corpus (no manifest.json in it); make one with 'a2g prepare'.",
+    "talk --out o --formats ,": "no format in ','",
+    "prepare folder no --out c": "no: there is no such folder; check the path.",
+    "prepare no.py . --out c": "no.py: there is no such file; name a Python file that defines DATASET.",
+    "train audio2gestures --corpus no --out r": "no: is not a corpus (no manifest.json in it);",
+    "train speech2gesture --corpus corpus --features no --out r": "no: is not a run (no run.json in it);",
+    "inspect no.bvh": "no.bvh: there is no such file; check the path.",
+    "inspect a.bvh --audio no.wav": "no.wav: there is no such file; check the path.",
+    "inspect no --score a.bvh --audio a.wav": "no: is not a run (no run.json in it);",
+    "inspect demo-flow --score no.bvh --audio a.wav": "no.bvh: there is no such file; check the path.",
+    "evaluate no --corpus corpus --out o": "no: is not a run (no run.json in it);",
+    "evaluate demo --corpus no --out o": "no: is not a corpus (no manifest.json in it);",
+    "evaluate demo --corpus corpus --features no --out o": "no: is not a run (no run.json in it);",
+    "evaluate demo --corpus corpus --emotion-classifier demo --out o": "demo: is not a run (no run.json in it);",
+    "evaluate --compare no --out o": "no: is no report (no report.json in it);",
+    "evaluate --corpus corpus --samples 0 --out o": "--samples: expected a whole number from 1 to 1000; got '0'",
+    "evaluate --corpus corpus --seed -1 --out o": "--seed: expected a whole number from 0 to 2147483647; got '-1'",
+    "retarget no.bvh --to body --out o.bvh": "no.bvh: there is no such file; check the path.",
+    "retarget a.bvh --to legs --out o.bvh": "legs: there is no such file; check the path.",
+    "retarget a.bvh --to body --out o.bvh --fps 0": "--fps: expected a number from 1 to 1000; got '0'",
+    "generate no --audio a.wav --out o": "no: is not a run (no run.json in it); train one with 'a2g train',",
+    "generate demo --audio no.wav --out o": "no.wav: there is no such file; check the path.",
+    "generate demo --audio a.wav --out o --pin no.bvh@1": "no.bvh: there is no such file; check the path.",
+    "generate demo --audio a.wav --out o --pin-blend 1": "--pin-blend is for --pin; name a clip and a second.",
+    "generate demo-flow --audio a.wav --out o --style no.bvh": "no.bvh: there is no such file; check the path.",
+    "generate demo-flow --audio a.wav --out o --seed-clip no.bvh": "no.bvh: there is no such file;",
+}
+
+EARLY = """
+import contextlib, io, json, sys
+from a2g_jax.cli import main
+from a2g_jax.cli.paths import existing_corpus, existing_file, existing_report, existing_run
+found = []
+for line in json.load(sys.stdin):
+    out, error = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+        try:
+            status = main(line.split())
+        except SystemExit as stop:
+            status = stop.code
+    heavy = [name for name in ("jax", "numpy", "jaxtyping", "librosa", "scipy", "tqdm") if name in sys.modules]
+    found.append([status, out.getvalue(), error.getvalue(), heavy])
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory):
+    """Status, both outputs and the heavy modules imported so far, by command line; all run in one process."""
+    folder = tmp_path_factory.mktemp("early")
+    (folder / "corpus").mkdir()
+    for name in ("corpus/manifest.json", "a.wav", "a.bvh"):
+        (folder / name).touch()
+    lines = ["--help", *(f"{command} --help" for command in COMMANDS), *REFUSED_EARLY]
+    shown = subprocess.run(
+        [sys.executable, "-c", EARLY], input=json.dumps(lines), capture_output=True, text=True, check=True, cwd=folder
     )
-    assert modules.stdout.strip() == "False"
+    assert sorted(path.name for path in folder.iterdir()) == ["a.bvh", "a.wav", "corpus"]
+    return dict(zip(lines, json.loads(shown.stdout), strict=True))
+
+
+def test_help_is_complete_and_imports_nothing_heavy(early):
+    status, out, error, heavy = early["--help"]
+    assert (status, error, heavy) == (0, "", [])
+    for command in COMMANDS:
+        assert command in out
+        status, out_of_command, error, heavy = early[f"{command} --help"]
+        assert (status, error, heavy) == (0, "", [])
+        assert out_of_command.startswith(f"usage: a2g {command}")
+
+
+@pytest.mark.parametrize("line", REFUSED_EARLY)
+def test_mistakes_are_refused_before_anything_heavy_is_imported(early, line):
+    status, out, error, heavy = early[line]
+    assert (status, out, heavy) == (2, "", [])
+    assert len(error.splitlines()) == 1
+    assert error.startswith("a2g: ")
+    assert REFUSED_EARLY[line] in error
+
+
+def test_early_messages_are_those_of_the_library(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for early_check, library in (
+        (existing_file, read_audio),
+        (existing_file, read_bvh),
+        (existing_run, load_run),
+        (existing_corpus, Corpus.open),
+        (existing_report, lambda path: read_report(Path(path))),
+    ):
+        messages = []
+        for check in (early_check, library):
+            with pytest.raises(InputError) as caught:
+                check("./nowhere")
+            messages.append(str(caught.value))
+        assert messages[0] == messages[1]
 
 
 @pytest.mark.parametrize(
@@ -54,24 +151,20 @@ def test_help_is_quick_and_complete():
         (["generate", "demo"], "--audio"),
         (["generate", "demo", "--audio", "x.wav", "--out", "o", "--samples", "0"], "from 1 to 1000; got '0'"),
         (["demo", "--seed", "five"], "expected a whole number from 0 to 2147483647; got 'five'"),
-        (["demo", "--nonsense"], "unknown argument --nonsense"),
         (["prepare", "talker", "--out", "c", "--minutes", "-3"], "above 0"),
         (["prepare", "folder", "--out", "c"], "name the folder"),
         (["prepare", "talker", "somewhere", "--out", "c"], "takes no source"),
         (["train", "audio2gestures", "--out", "r"], "--corpus is needed"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r"], "is not a corpus"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--preset", "huge"], "no preset 'huge'"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--colour", "red"], "no setting --colour"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--steps", "many"], "--steps: expected a whole"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--kernel-size", "2"], "an odd number; got 2"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--log-every", "0"], "expected 1 or more; got 0"),
-        (["train", "audio2gestures", "--corpus", "c", "--out", "r", "--schedule", "wild"], "'cosine' or 'noam'"),
+        (["train", "audio2gestures", "--settings", "--preset", "huge"], "no preset 'huge'"),
+        (["train", "audio2gestures", "--settings", "--colour", "red"], "no setting --colour"),
+        (["train", "audio2gestures", "--settings", "--steps", "many"], "--steps: expected a whole"),
+        (["train", "audio2gestures", "--settings", "--kernel-size", "2"], "an odd number; got 2"),
+        (["train", "audio2gestures", "--settings", "--log-every", "0"], "expected 1 or more; got 0"),
+        (["train", "audio2gestures", "--settings", "--schedule", "wild"], "'cosine' or 'noam'"),
         (["train", "audio2gestures", "--settings", "--audio-channels", ""], "expected numbers above 0"),
         (["train", "audio2gestures", "--settings", "--learning-rate", "nan"], "expected a number above 0"),
         (["prepare", "folder", ".", "--minutes", "3", "--out", "c"], "--minutes is for"),
         (["prepare", "talker", "--out", "/proc/nothing/c", "--minutes", "1"], "cannot be made"),
-        (["generate", "nowhere", "--audio", "x.wav", "--out", "o"], "is not a run"),
-        (["demo", "--formats", "gif"], "no format 'gif'"),
     ],
 )
 def test_bad_usage(capsys, tmp_path, monkeypatch, arguments, message):

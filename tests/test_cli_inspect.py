@@ -2,15 +2,12 @@
 
 import argparse
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
+from a2g_jax.cli.inspect import add_arguments, run
 from a2g_jax.errors import InputError
-from a2g_jax.inspection.arguments import add_arguments
-from a2g_jax.inspection.command import run
 from a2g_jax.inspection.report import FORMAT
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
@@ -108,8 +105,15 @@ def test_errors_name_what_is_wrong(files, tmp_path):
         inspect(tmp_path / "cut.bvh")
 
 
-def test_flags_cost_nothing():
-    """The command line must not wait for JAX or NumPy before it prints its help."""
-    code = "import sys, a2g_jax.inspection.arguments; print([m for m in ('jax', 'numpy', 'scipy') if m in sys.modules])"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == "[]"
+@pytest.mark.parametrize(("name", "model"), [("demo", "audio2gestures"), ("demo-flow", "stylized_flow")])
+def test_runs_of_the_package_by_name(name, model, files, tmp_path, monkeypatch, capsys):
+    """By name as ``a2g generate`` and ``a2g evaluate`` open them; with ./ the name is a folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    assert inspect(name, "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["kind"], document["path"], document["facts"]["run"]["model"]) == ("run", name, model)
+    with pytest.raises(InputError, match="is a run; --audio belongs to one motion"):
+        inspect(name, "--audio", files / "a.wav")
+    with pytest.raises(InputError, match="holds no WAV and no BVH"):
+        inspect(f"./{name}")

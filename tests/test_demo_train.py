@@ -4,15 +4,14 @@ import dataclasses
 
 from conftest import TOY_MODEL
 
-from a2g_jax import commands
-from a2g_jax.cli import main
+from a2g_jax.cli import demo, main
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker import recordings
 
 
 def test_demo_trains(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(commands, "DEMO_MINUTES", 0.3)
+    monkeypatch.setattr(demo, "DEMO_MINUTES", 0.3)
     monkeypatch.setattr(recordings, "RECORDING_SECONDS", 6.0)
     entry = find_model("audio2gestures")
     monkeypatch.setitem(entry.presets, "tiny", dataclasses.replace(entry.presets["tiny"], **TOY_MODEL))

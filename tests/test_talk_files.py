@@ -125,7 +125,7 @@ def test_a_recording_of_a_corpus(tmp_path, capsys):
         (["--speaker", "nobody"], "no speaker 'nobody'"),
         (["--emotion", "hunger"], "no emotion 'hunger'"),
         (["--formats", "wav,mp4"], "no format 'mp4'"),
-        (["--formats", ","], "names none"),
+        (["--formats", ","], "no format in ','"),
         (["--recording", "0000"], "--corpus"),
         (["--corpus", "nowhere"], "not a corpus"),
         (["--seconds", "600", "--samples", "1000"], "too large"),
@@ -136,7 +136,11 @@ def test_errors_are_one_line_and_leave_nothing(tmp_path, monkeypatch, capsys, ar
     if "600" in arguments:  # as long, without the computing
         monkeypatch.setattr("a2g_jax.generation.talk.files._PAGE_LIMIT", 1000)
         arguments = ["--seconds", "4"]
-    assert main(["talk", "--out", str(tmp_path / "out"), *arguments]) == 2
+    try:
+        status = main(["talk", "--out", str(tmp_path / "out"), *arguments])
+    except SystemExit as stop:
+        status = stop.code
+    assert status == 2
     error = capsys.readouterr().err.strip().splitlines()
     assert message in error[-1]
     assert len([line for line in error if line.startswith("a2g:")]) == 1

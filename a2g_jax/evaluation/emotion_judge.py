@@ -17,9 +17,9 @@ from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.places import Pose
 from a2g_jax.io.files import sha256_file
-from a2g_jax.models.emotion_classifier.model import classify
-from a2g_jax.training.perceptual import check_sight
-from a2g_jax.training.run import WEIGHTS_FILE, Run, load_run
+from a2g_jax.training.perceptual import check_poses
+from a2g_jax.training.run import Run, load_run
+from a2g_jax.training.run_file import WEIGHTS_FILE
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +33,9 @@ class EmotionJudge:
     @cached_property
     def _logits(self) -> Any:
         config = self.run.config
-        data = config.data()
-        return jax.jit(
-            lambda params, pose: classify(
-                config.model_config, data, params, Batch(jnp.zeros((*pose.shape[:2], data.audio_bands)), pose)
-            )
-        )
+        classifier, bands = config.build().classifier, config.mel.width
+        assert classifier is not None
+        return jax.jit(lambda params, pose: classifier.logits(params, Batch(jnp.zeros((*pose.shape[:2], bands)), pose)))
 
     def accuracy(self, pose: Pose, emotion: str) -> float:
         """Share of the motion's clips that are taken for the emotion (EmotionGesture's EA); NaN for too short ones and
@@ -60,12 +57,13 @@ def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> Emotio
     """
     run = load_run(folder)
     config = run.config
-    if config.model != "emotion_classifier" or config.model_config.input != "motion":
+    classifier = config.build().classifier
+    if classifier is None or classifier.input != "motion":
         raise InputError(
             f"{folder}: is no classifier of emotions in motion; train one with 'a2g train"
             " emotion_classifier --input motion'."
         )
-    check_sight(str(folder), config, corpus)
+    check_poses(str(folder), config, corpus)
     if not set(corpus.emotions) & set(config.corpus["emotions"]):
         raise InputError(
             f"{folder}: knows the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."

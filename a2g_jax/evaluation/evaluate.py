@@ -19,7 +19,7 @@ from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.places import Body, Pose
 from a2g_jax.evaluation.report import BASELINES
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets

@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.models.motion_autoencoder import encode
 from a2g_jax.training.perceptual import load_feature_run
 from a2g_jax.training.run import Run
 
@@ -35,9 +34,7 @@ class FeatureNetwork:
 
     @cached_property
     def _blocks(self) -> Any:
-        config = self.run.config
-        data = config.data()
-        return jax.jit(lambda params, pose: encode(config.model_config, data, params, pose))
+        return jax.jit(self.run.config.build().features)
 
     def blocks(self, pose: Float[np.ndarray, "B T R D"]) -> list[Float[np.ndarray, "B T _"]]:
         """Features of every residual block, frame by frame."""

@@ -12,11 +12,9 @@ themselves (see :mod:`a2g_jax.models.stylized_flow.likelihood`); it is no cross-
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -26,7 +24,7 @@ from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regress
 from a2g_jax.evaluation.evaluate import check_runs
 from a2g_jax.evaluation.likelihood_clips import Clips, clip_batches, clip_starts, scored_frames
 from a2g_jax.metrics.intervals import Interval, bootstrap_mean
-from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.base import Density
 from a2g_jax.training.run import Run, RunConfig
 
 #: Strengths of the ridge, of which the validation split chooses.
@@ -77,10 +75,7 @@ def compiled_score(run: Run) -> Callable[..., Any]:
     Raises:
         InputError: the run's model tells no densities.
     """
-    model = run.config.build()
-    if model.score is None:
-        raise InputError(f"{run.config.model}: tells no likelihood of a motion; name a run of stylized_flow.")
-    score, params = jax.jit(model.score), jax.device_put(run.params)
+    score, params = jax.jit(density_of(run.config).log_likelihood), jax.device_put(run.params)
     return lambda *clips: score(params, *clips)
 
 
@@ -108,7 +103,7 @@ def gaussian_bits_per_dim(
 
 def fit_gaussian(config: RunConfig, corpus: Corpus, seed: int = 0, most_clips: int = 4000) -> ConditionalGaussian:
     """The distribution of :func:`gaussian_bits_per_dim`."""
-    starts, noise = clip_starts(config, corpus, "train"), config.model_config.input_noise
+    starts, noise = clip_starts(config, corpus, "train"), density_of(config).noise
     if len(starts) > most_clips:
         starts = np.sort(np.random.default_rng(seed).choice(starts, most_clips, replace=False))
     regression, told = Regression(), told_rows(config)
@@ -124,16 +119,21 @@ def fit_gaussian(config: RunConfig, corpus: Corpus, seed: int = 0, most_clips: i
     return min(fits, key=lambda fit: -sum(float(fit.log_density(*one).sum()) for one in rows))
 
 
+def density_of(config: RunConfig) -> Density:
+    """The density of a run's model.
+
+    Raises:
+        InputError: the model has none.
+    """
+    density = config.build().density
+    if density is None:
+        raise InputError(f"{config.model}: gives no likelihood of a motion; name a run of stylized_flow.")
+    return density
+
+
 def told_rows(config: RunConfig) -> Callable[[Clips], tuple[np.ndarray, np.ndarray]]:
     """A function that gives what the scored frames of a batch are told, (n N, D), and their z-scores, (n N, C)."""
-    # The global feature is left out: it is a function of the rest.
-    networks = FlowNetworks(replace(config.model_config, global_channels=0, predictor=False), config.data())
-
-    @jax.jit
-    def told(audio, pose, clean):
-        flat = networks.flat(pose)
-        parts = networks.told({}, audio, flat, controls=networks.controls(clean))
-        return jnp.concatenate([parts.history, parts.known], axis=-1), networks.inner(flat)
+    told = jax.jit(density_of(config).conditioning)
 
     def rows(clips: Clips) -> tuple[np.ndarray, np.ndarray]:
         given, values = (np.asarray(a)[: clips.kept] for a in told(clips.audio, clips.pose, clips.clean))
@@ -143,7 +143,7 @@ def told_rows(config: RunConfig) -> Callable[[Clips], tuple[np.ndarray, np.ndarr
 
 
 def _likelihood(config: RunConfig, corpus: Corpus, split: str, seed: int, scores: _Scores) -> Likelihood:
-    starts, noise = clip_starts(config, corpus, split), config.model_config.input_noise
+    starts, noise = clip_starts(config, corpus, split), density_of(config).noise
     dimensions = config.statistics["pose"].mean.size
 
     def bits(noise: float) -> Float[np.ndarray, " clips"]:

@@ -59,6 +59,11 @@ def motion_formats() -> dict[str, MotionFormat]:
     return found
 
 
+def talk_formats() -> tuple[str, ...]:
+    """Names of the formats of a generated recording: of its speech and truth, of motions, and the page."""
+    return ("wav", "textgrid", "json", *motion_formats(), PAGE)
+
+
 def chosen_formats(text: str, known: Sequence[str]) -> tuple[str, ...]:
     """The formats in a comma-separated list.
 

@@ -1,6 +1,7 @@
 """Inspecting a run made by ``a2g train``."""
 
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,22 +12,26 @@ from flax.traverse_util import flatten_dict
 from a2g_jax.inspection.finding import Finding
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.tree import skeleton_facts
-from a2g_jax.training.run import Run, load_run
+from a2g_jax.training.run import Run, open_run
+from a2g_jax.training.run_file import SHIPPED
 
 _METRICS = "metrics.jsonl"
 #: Times the best validation loss from which the last one has got worse and not merely fluctuates.
 _WORSE = 1.25
 
 
-def inspect_run(path: Path) -> Report:
+def inspect_run(name: str | os.PathLike[str]) -> Report:
     """Model, settings, corpus, size and progress of a run.
 
+    Args:
+        name: a run folder, or the name of a run that comes with the package.
+
     Raises:
-        InputError: it is no run, or a damaged one.
+        InputError: not a run, or a damaged one.
     """
-    run = load_run(path)
-    log = _metrics(path / _METRICS)
-    return Report(str(path), "run", run_facts(run, log), check_run(run, log))
+    run = open_run(name)
+    log = [] if str(name) in SHIPPED else _metrics(Path(name) / _METRICS)
+    return Report(str(name), "run", run_facts(run, log), check_run(run, log))
 
 
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:

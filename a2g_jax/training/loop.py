@@ -22,7 +22,8 @@ from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.log import MetricsLog
-from a2g_jax.training.run import FORMAT, RUN_FILE, WEIGHTS_FILE, Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.run import Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.run_file import FORMAT, RUN_FILE, WEIGHTS_FILE
 from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 from a2g_jax.training.validation import collect_summary, validate

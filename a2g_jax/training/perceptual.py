@@ -10,7 +10,8 @@ from jaxtyping import Array
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import sha256_file
-from a2g_jax.training.run import WEIGHTS_FILE, Perceptual, Run, RunConfig, demo_feature_run, load_run
+from a2g_jax.training.run import Perceptual, Run, RunConfig, demo_feature_run, load_run
+from a2g_jax.training.run_file import WEIGHTS_FILE
 
 
 def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple[Run, str]:

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,21 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import atomic_path, read_json, sha256_file, write_json
+from a2g_jax.io.files import atomic_path, sha256_file, write_json
 from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.entry import Entry
 from a2g_jax.models.registry import find_model, find_trained_model
 from a2g_jax.models.train_config import TrainConfig
-
-FORMAT = "a2g_jax run"
-VERSION = 1
-RUN_FILE = "run.json"
-WEIGHTS_FILE = "weights.safetensors"
+from a2g_jax.training.run_file import (
+    FORMAT,
+    RUN_FILE,
+    SHIPPED_FEATURES,
+    VERSION,
+    WEIGHTS_FILE,
+    read_description,
+    run_folder,
+    split_settings,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,14 +219,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     from safetensors.numpy import load_file
 
     folder = Path(folder)
-    about = folder / RUN_FILE
-    if not about.is_file():
-        raise InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
-    values = read_json(about)
-    if not isinstance(values, dict) or values.get("format") != FORMAT:
-        raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
-    if values.get("version") != VERSION:
-        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it anew.")
+    about, values = folder / RUN_FILE, read_description(folder)
     weights = folder / WEIGHTS_FILE
     if not weights.is_file():
         raise InputError(f"{weights}: there is no such file; resume training with 'a2g train ... --resume'.")
@@ -236,7 +233,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             for name in ("audio", "pose", "root")
         }
         entry = find_trained_model(str(values["model"]), str(about))
-        settings, sampling = _split_settings(entry, values)
+        settings, sampling = split_settings(entry, values)
         config = RunConfig(
             model=values["model"],
             preset=values["preset"],
@@ -266,45 +263,29 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     return Run(config, params, summary, steps)
 
 
-#: Settings of generation that runs of version 0.1 kept among those of the model, by their names then.
-_MOVED = {"control_curves": "controls"}
-
-
-def _split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Settings of the model and of generation; in runs of version 0.1 both stand together."""
-    settings, sampling = dict(values["model_config"]), values.get("sampling")
-    if sampling is not None:
-        return settings, dict(sampling)
-    own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
-    moved = {name: _MOVED.get(name, name) for name in settings}
-    return (
-        {name: value for name, value in settings.items() if moved[name] not in own},
-        {moved[name]: value for name, value in settings.items() if moved[name] in own},
-    )
-
-
 def demo_run() -> Run:
     """The trained Audio2Gestures that is shipped with the package: ``demo`` on the command line."""
-    with resources.as_file(resources.files("a2g_jax") / "demo") as folder:
-        return load_run(folder)
+    return open_run("demo")
 
 
 def demo_flow_run() -> Run:
     """The trained flow that is shipped with the package: ``demo-flow`` on the command line."""
-    with resources.as_file(resources.files("a2g_jax") / "demo_flow") as folder:
-        return load_run(folder)
+    return open_run("demo-flow")
 
 
 def open_run(name: str | os.PathLike[str]) -> Run:
-    """A run folder, or one of those that are shipped with the package: ``demo`` and ``demo-flow``."""
-    shipped = {"demo": demo_run, "demo-flow": demo_flow_run}.get(str(name))
-    return load_run(name) if shipped is None else shipped()
+    """A run folder, or one of those that are shipped with the package: ``demo`` and ``demo-flow``.
+
+    Raises:
+        InputError: not a run, nothing trained yet, or damaged or mismatching files.
+    """
+    return load_run(run_folder(name))
 
 
 def demo_feature_run() -> tuple[Run, str]:
     """The shipped feature network, and the SHA-256 of its weights."""
-    with resources.as_file(resources.files("a2g_jax") / "demo_features") as folder:
-        return load_run(folder), sha256_file(folder / WEIGHTS_FILE)
+    folder = run_folder("demo", SHIPPED_FEATURES)
+    return load_run(folder), sha256_file(folder / WEIGHTS_FILE)
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from a2g_jax.cli import READERS, main
+from a2g_jax.cli import main
+from a2g_jax.cli.prepare import READERS
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import NAMES, find_data_set
 from a2g_jax.data.settings import PRESETS

@@ -11,7 +11,7 @@ from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation import engine as module
 from a2g_jax.generation.engine import Generator
-from a2g_jax.generation.export import check_formats
+from a2g_jax.generation.formats import check_formats
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_euler
@@ -120,7 +120,7 @@ def test_skeletons_without_ankles_stand_still():
 def test_formats():
     assert check_formats("bvh, HTML") == ("bvh", "html")
     for text in ("", "fbx", "bvh;npz"):
-        with pytest.raises(InputError, match="--formats"):
+        with pytest.raises(InputError, match="no format"):
             check_formats(text)
 
 

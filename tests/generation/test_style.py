@@ -235,7 +235,7 @@ def test_from_the_command_line(files, tmp_path, capsys, monkeypatch):
     blended = ["--style-with", "other.bvh", "--style-mix", "0.3", "--style-mode", "statistics"]
     assert main([*command, *style, *blended, "--seed-clip", "other.bvh"]) == 0
     told = capsys.readouterr().out
-    assert "other.bvh: heard in silence, as no --style-with-audio names its speech" in told
+    assert "other.bvh: encoded with silence: no --style-with-audio names its speech" in told
     assert "clip.bvh: heard" not in told
     page = (tmp_path / "out" / "index.html").read_text()
     assert "style of clip.bvh and other.bvh (0.3), share 0.9, statistics, going on from other.bvh" in page

@@ -16,7 +16,7 @@ from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack
-from a2g_jax.inspection.command import inspect
+from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh
 

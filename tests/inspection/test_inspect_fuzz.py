@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from recordings_for_tests import clean, write_pair
 
 from a2g_jax.errors import InputError
-from a2g_jax.inspection.command import inspect
+from a2g_jax.inspection.inspect import inspect
 from a2g_jax.io.npz import write_motion_npz
 
 

@@ -9,7 +9,7 @@ from recordings_for_tests import CAST, RATE, clean, codes, frozen, long_talk, tu
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import find_rig
 from a2g_jax.inspection.audio_checks import check_audio, clipped_share
-from a2g_jax.inspection.command import inspect
+from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.sync import RATE as RATE_OF_OFFSETS
 from a2g_jax.inspection.sync import at_rate, check_lengths, check_offset, energy_db, measure_offset, wrist_places

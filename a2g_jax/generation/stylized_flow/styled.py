@@ -1,6 +1,5 @@
-"""Samples in the style of clips, and going on from clips, as the command line asks for them."""
+"""Samples in the style of clips and with the seed poses of clips, from their files."""
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,6 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.pins import face, read_on_skeleton
-from a2g_jax.generation.style_arguments import MIX, MODE, SHARE
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style, blend
 from a2g_jax.geometry.motion import Motion
@@ -41,11 +39,11 @@ class Styling:
     """Blended with the first."""
     seed_clip: Clip | None = None
     """Gone on from."""
-    share: float = SHARE
+    share: float = 0.9
     """Of style beside chance."""
-    mode: str = MODE
+    mode: str = "repeat"
     """See :mod:`a2g_jax.generation.stylized_flow.style`."""
-    mix: float = MIX
+    mix: float = 0.5
     """Of the second clip."""
 
     @property
@@ -63,7 +61,7 @@ class Styling:
     def notes(self) -> tuple[str, ...]:
         """What the user should know."""
         silent = [clip for clip in (self.style, self.second) if clip is not None and clip.audio is None]
-        return tuple(f"{clip.path}: heard in silence, as no {clip.flag}-audio names its speech" for clip in silent)
+        return tuple(f"{clip.path}: encoded with silence: no {clip.flag}-audio names its speech" for clip in silent)
 
     def place(self, run: Run, samples: int) -> "Styled":
         """The clips as a run sees them.
@@ -124,38 +122,3 @@ def read_facing(clip: Clip, run: Run) -> Motion:
     motion = read_on_skeleton(clip.path, config.skeleton, config.fps)
     usual = rotations_from_rows(np.asarray(config.statistics["pose"].mean)[None], config.representation)
     return face(motion, np.asarray(usual[0, 0], np.float64))[0]
-
-
-def styling_of(options: argparse.Namespace) -> Styling | None:
-    """What the flags of :mod:`a2g_jax.generation.style_arguments` ask for; None if nothing.
-
-    Raises:
-        InputError: a flag that is for another one which is not there, or clips pinned as well.
-    """
-    if options.style is None:
-        flags = ("style_audio", "style_share", "style_mode", "style_with", "style_with_audio", "style_mix")
-        _refuse(options, flags, "--style; name a clip")
-    if options.style_with is None:
-        _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
-    if options.style is None and options.seed_clip is None:
-        return None
-    if options.pin:
-        raise InputError("--pin is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow.")
-    return Styling(
-        style=_clip("--style", options.style, options.style_audio),
-        second=_clip("--style-with", options.style_with, options.style_with_audio),
-        seed_clip=_clip("--seed-clip", options.seed_clip, None),
-        share=SHARE if options.style_share is None else options.style_share,
-        mode=options.style_mode or MODE,
-        mix=MIX if options.style_mix is None else options.style_mix,
-    )
-
-
-def _refuse(options: argparse.Namespace, names: tuple[str, ...], what: str) -> None:
-    for name in names:
-        if getattr(options, name) is not None:
-            raise InputError(f"--{name.replace('_', '-')} is for {what}.")
-
-
-def _clip(flag: str, path: str | None, audio: str | None) -> Clip | None:
-    return None if path is None else Clip(flag, Path(path), None if audio is None else Path(audio))

@@ -9,7 +9,7 @@ import jax
 
 from a2g_jax import __version__
 from a2g_jax.data.recording import Recording
-from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size, motion_formats
+from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
 from a2g_jax.generation.talk.page import write_talk_page
 from a2g_jax.generation.talk.request import TalkRequest, truth_from_json
 from a2g_jax.geometry.motion import Motion
@@ -22,11 +22,6 @@ from a2g_jax.talker.transcript import speech_tiers
 from a2g_jax.talker.truth import GestureTruth
 
 _OTHERS = r"speech\.(wav|TextGrid|json)|truth_\d\d+\.json"
-
-
-def talk_formats() -> tuple[str, ...]:
-    """Names of the formats of a generated recording."""
-    return ("wav", "textgrid", "json", *motion_formats(), PAGE)
 
 
 def right_motions(recording: Recording, samples: int, seed: int) -> Iterator[tuple[Motion, GestureTruth]]:
@@ -64,7 +59,7 @@ def deliver_talk(
         out: folder, made if needed; files of other names in it stay.
         request: the seed of the draws, and the view.
         samples: how many motions.
-        formats: of :func:`talk_formats`.
+        formats: of :func:`~a2g_jax.generation.formats.talk_formats`.
         report: called with the number of motions done.
 
     Returns:

@@ -1,0 +1,168 @@
+"""Flags of ``a2g generate`` that name clips: pinned to the timeline, as a style, or as seed poses."""
+
+import argparse
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from a2g_jax.cli.argument_types import number, share
+from a2g_jax.cli.paths import existing_corpus, existing_file
+from a2g_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from a2g_jax.generation.generator import Sampler
+    from a2g_jax.generation.stylized_flow.styled import Clip
+    from a2g_jax.training.run import Run
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the flags of pins and styles; their defaults are those of ``Pins`` and ``Styling``."""
+    pin = parser.add_argument_group("clips on the timeline (runs of audio2gestures)")
+    pin.add_argument(
+        "--pin",
+        action="append",
+        metavar="FILE@SECOND[+LENGTH]",
+        help="a BVH or NPZ to perform from that second on (its first LENGTH seconds); may be repeated",
+    )
+    pin.add_argument(
+        "--pin-blend",
+        type=number(float, 0, 10, "a number from 0 to 10"),
+        metavar="SECONDS",
+        help="on either side of each (default: 0.75)",
+    )
+    pin.add_argument(
+        "--pin-shared",
+        type=share,
+        metavar="SHARE",
+        help="of the clip's own shared code beside the audio's (default: 0, as in the paper)",
+    )
+    pin.add_argument(
+        "--pin-corpus",
+        metavar="CORPUS",
+        help="corpus whose 99th percentile of jerk is compared with the seams' (default: the clip's)",
+    )
+    style = parser.add_argument_group("the style of a clip (runs of stylized_flow)")
+    style.add_argument("--style", metavar="CLIP", help="a BVH or NPZ whose style the motions take on")
+    style.add_argument("--style-audio", metavar="FILE", help="the clip's own speech (default: silence)")
+    style.add_argument("--style-share", type=share, metavar="SHARE", help="of style beside chance (default: 0.9)")
+    style.add_argument(
+        "--style-mode",
+        choices=("repeat", "statistics"),
+        help="the clip's latents forwards and backwards, or only their mean and standard deviation (default: repeat)",
+    )
+    style.add_argument("--style-with", metavar="CLIP", help="a second clip, to blend the style with")
+    style.add_argument("--style-with-audio", metavar="FILE", help="its speech (default: silence)")
+    style.add_argument("--style-mix", type=share, metavar="SHARE", help="of the second clip (default: 0.5)")
+    style.add_argument(
+        "--seed-clip", metavar="CLIP", help="a BVH or NPZ whose last poses are the seed poses of the motions"
+    )
+
+
+def check_flags(options: argparse.Namespace) -> None:
+    """Refuse flags that belong to a flag that is not there, and pins together with styles.
+
+    Raises:
+        InputError: such a flag.
+    """
+    if not options.pin:
+        _refuse(options, ("pin_blend", "pin_shared", "pin_corpus"), "--pin; name a clip and a second")
+    if options.style is None:
+        names = ("style_audio", "style_share", "style_mode", "style_with", "style_with_audio", "style_mix")
+        _refuse(options, names, "--style; name a clip")
+    if options.style_with is None:
+        _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
+    if options.pin and (options.style is not None or options.seed_clip is not None):
+        raise InputError("--pin is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow.")
+
+
+def check_files(options: argparse.Namespace) -> None:
+    """Refuse clips, speeches and corpora that do not exist.
+
+    Raises:
+        InputError: there is no such file or corpus.
+    """
+    for text in options.pin or ():
+        path, at, _ = text.rpartition("@")
+        if at:
+            existing_file(path)
+    existing_corpus(options.pin_corpus)
+    for name in ("style", "style_audio", "style_with", "style_with_audio", "seed_clip"):
+        existing_file(getattr(options, name))
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A sampler, and its contribution to the output."""
+
+    sampler: "Sampler"
+    about: dict[str, Any] = field(default_factory=dict)
+    """Further arguments of :func:`~a2g_jax.generation.export.export`."""
+    report: Callable[[Path], Iterable[str]] = lambda out: ()
+    """Writes its files to the output folder, and gives the lines to print."""
+
+
+def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
+    """The sampler of the flags: plain, pinned or styled.
+
+    Args:
+        audio: (N,), mono, at the run's sample rate.
+
+    Raises:
+        InputError: a run or clip that cannot be used for it.
+    """
+    if options.pin:
+        return _pinned(run, audio, options)
+    if options.style is not None or options.seed_clip is not None:
+        return _styled(run, options)
+
+    from a2g_jax.generation.generator import Generator
+
+    return Chosen(Generator(run))
+
+
+def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
+    from a2g_jax.data.corpus import Corpus
+    from a2g_jax.generation.audio2gestures.pin_report import describe
+    from a2g_jax.generation.audio2gestures.pinned import Pins
+    from a2g_jax.generation.generator import audio_frames
+    from a2g_jax.io.files import write_json
+
+    corpus = None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
+    values = _given({"blend": options.pin_blend, "shared": options.pin_shared})
+    pinned = Pins(tuple(options.pin), corpus=corpus, **values).place(run, audio_frames(run, audio))
+
+    def report(out: Path) -> list[str]:
+        write_json(out / "pins.json", pinned.reports)
+        return [f"sample {number}, {describe(row)}" for number, rows in enumerate(pinned.reports) for row in rows]
+
+    return Chosen(pinned, {"lanes": (pinned.lane(),), "others": r"pins\.json"}, report)
+
+
+def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
+    from a2g_jax.generation.stylized_flow.styled import Styling
+
+    values = {"share": options.style_share, "mode": options.style_mode, "mix": options.style_mix}
+    styling = Styling(
+        style=_clip("--style", options.style, options.style_audio),
+        second=_clip("--style-with", options.style_with, options.style_with_audio),
+        seed_clip=_clip("--seed-clip", options.seed_clip, None),
+        **_given(values),
+    )
+    return Chosen(styling.place(run, options.samples), {"label": styling.label}, lambda out: styling.notes)
+
+
+def _clip(flag: str, path: str | None, audio: str | None) -> "Clip | None":
+    from a2g_jax.generation.stylized_flow.styled import Clip
+
+    return None if path is None else Clip(flag, Path(path), None if audio is None else Path(audio))
+
+
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _refuse(options: argparse.Namespace, names: tuple[str, ...], what: str) -> None:
+    for name in names:
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name.replace('_', '-')} is for {what}.")

@@ -1,0 +1,63 @@
+"""``a2g demo``: motions for a speech with the weights that come with the package, or newly trained ones."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from a2g_jax.cli import sampling
+from a2g_jax.cli.paths import existing_file
+
+DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
+#: Minutes of generated recordings that ``--train`` trains on.
+DEMO_MINUTES = 20.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g demo``."""
+    parser.add_argument("--audio", metavar="FILE", help="your speech (default: a generated one)")
+    parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
+    parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write to (default: demo)")
+    sampling.add_arguments(parser)
+
+
+def run(options: argparse.Namespace, _extra: list[str]) -> None:
+    """Generate, write and print.
+
+    Raises:
+        InputError: audio or a folder that cannot be used.
+    """
+    existing_file(options.audio)
+
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.features.mel import MelConfig
+    from a2g_jax.generation.generator import Generator
+    from a2g_jax.io.audio import read_audio
+    from a2g_jax.talker.demo_speech import demo_speech
+    from a2g_jax.training.run import demo_run
+
+    keep_compilations()
+    # Bad audio is refused before minutes of training.
+    words: Any = ()
+    if options.audio is not None:
+        audio, title = read_audio(options.audio, MelConfig().sample_rate), Path(options.audio).name
+    else:
+        speech = demo_speech()
+        audio, title, words = speech.audio, "a generated speech", speech.words
+    trained = _train(Path(options.out)) if options.train else demo_run()
+    sampling.write_samples(trained, Generator(trained), audio, options, title, words=words)
+
+
+def _train(out: Path) -> Any:
+    """The run in ``out / "run"``, trained or resumed on the corpus in ``out / "corpus"``."""
+    from a2g_jax.data.generated import TalkerOptions
+    from a2g_jax.data.prepare import prepare_talker
+    from a2g_jax.models import find_model
+    from a2g_jax.models.train_config import TRAIN_PRESETS
+    from a2g_jax.training.start import run_training
+
+    if not (out / "corpus").exists():
+        prepare_talker(out / "corpus", TalkerOptions(minutes=DEMO_MINUTES))
+    model = find_model("audio2gestures").presets["tiny"]
+    return run_training(
+        "audio2gestures", "tiny", model, TRAIN_PRESETS["tiny"], out / "corpus", out / "run", resume=True
+    )

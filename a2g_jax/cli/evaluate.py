@@ -1,0 +1,115 @@
+"""``a2g evaluate``: scores of runs on a corpus as a report."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from a2g_jax.cli.argument_types import count, seed
+from a2g_jax.cli.paths import existing_corpus, existing_features, existing_report, existing_run
+from a2g_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from a2g_jax.training.run import Run
+
+DESCRIPTION = (
+    "Score runs on a held-out split, beside the scores of the ground truth, other right motions, noise, a neighbour's"
+    " motion and the mean pose."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g evaluate``."""
+    parser.add_argument("runs", nargs="*", metavar="RUN", help="run folders, demo or demo-flow; none: baselines only")
+    parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and .png")
+    parser.add_argument(
+        "--features",
+        metavar="RUN",
+        help="a run of motion_autoencoder, or 'demo' for the one in the package; for FGD and LPIPS (default: none)",
+    )
+    parser.add_argument(
+        "--emotion-classifier", metavar="RUN", help="a run of emotion_classifier --input motion, for emotion accuracy"
+    )
+    parser.add_argument(
+        "--compare", nargs="+", metavar="REPORT", help="instead of scoring: folders of reports, as one table"
+    )
+    parser.add_argument(
+        "--audit",
+        action="store_true",
+        help="also test whether each run depends on the audio: late audio, other audio, silence, loudness",
+    )
+    parser.add_argument("--split", default="test", help="of the corpus (default: test)")
+    parser.add_argument("--samples", type=count, default=20, help="motions of each run for each clip (default: 20)")
+    parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
+
+
+def run(options: argparse.Namespace, _extra: list[str]) -> None:
+    """Score or compare, write the report and print its table.
+
+    Raises:
+        InputError: a run, corpus, report or feature network that cannot be used, or that do not belong together.
+    """
+    result = _compare(options) if options.compare else _score(options)
+
+    from a2g_jax.evaluation.report import markdown, write_report
+
+    written = write_report(result, Path(options.out))
+    print(markdown(result))
+    print(f"{options.out}: {', '.join(path.name for path in written)}")
+
+
+def _score(options: argparse.Namespace) -> dict[str, Any]:
+    if options.corpus is None:
+        raise InputError("--corpus is needed: what the runs are scored on; or --compare existing reports.")
+    for number, name in enumerate(options.runs):
+        if name in options.runs[:number]:
+            raise InputError(f"{name}: is named twice.")
+        existing_run(name)
+    existing_corpus(options.corpus)
+    existing_features(options.features)
+    existing_run(options.emotion_classifier, ())
+
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.data.corpus import Corpus
+    from a2g_jax.evaluation.emotion_judge import load_emotion_judge
+    from a2g_jax.evaluation.evaluate import evaluate
+    from a2g_jax.evaluation.feature_network import load_feature_network
+    from a2g_jax.progress import progress_bar
+    from a2g_jax.training.run import open_run
+
+    keep_compilations()
+    runs: dict[str, Run] = {name: open_run(name) for name in options.runs}
+    corpus = Corpus.open(options.corpus)
+    network = load_feature_network(options.features, corpus) if options.features else None
+    judge = load_emotion_judge(options.emotion_classifier, corpus) if options.emotion_classifier else None
+    with progress_bar(1, "scoring", "motion") as bar:
+
+        def report(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        return evaluate(
+            runs,
+            corpus,
+            split=options.split,
+            samples=options.samples,
+            seed=options.seed,
+            network=network,
+            judge=judge,
+            audit=options.audit,
+            report=report,
+        )
+
+
+def _compare(options: argparse.Namespace) -> dict[str, Any]:
+    """One table of several reports."""
+    if options.runs or options.corpus or options.features or options.audit or options.emotion_classifier:
+        raise InputError("--compare takes reports as they are; leave out runs, --corpus, --features and --audit.")
+    if len(set(options.compare)) < len(options.compare):
+        raise InputError("--compare: a report is named twice.")
+    for folder in options.compare:
+        existing_report(folder)
+
+    from a2g_jax.evaluation.report import merge, read_report
+
+    return merge({str(Path(folder)): read_report(Path(folder)) for folder in options.compare})

@@ -1,0 +1,64 @@
+"""``a2g generate``: motions for a speech with a trained run."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from a2g_jax.cli import clips, sampling
+from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.config import settings_lines
+from a2g_jax.errors import InputError
+
+DESCRIPTION = (
+    "Generate motions for a speech with a trained run. Every setting of the model's generation is a flag too, such as"
+    " --temperature or --edit: 'a2g generate RUN --settings' lists them."
+)
+#: Further flags are settings.
+TAKES_SETTINGS = True
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g generate``; those of settings are read later, since they depend on the run."""
+    parser.add_argument(
+        "run", help="a run folder, or 'demo' or 'demo-flow' for those that are shipped with the package"
+    )
+    parser.add_argument("--audio", metavar="FILE", help="speech, in any common format")
+    parser.add_argument("--out", metavar="DIR", help="folder to write to")
+    parser.add_argument("--settings", action="store_true", help="list the settings of generation, and exit")
+    clips.add_arguments(parser)
+    sampling.add_arguments(parser)
+
+
+def run(options: argparse.Namespace, extra: list[str]) -> None:
+    """Generate, write and print; or list the settings.
+
+    Args:
+        extra: settings of generation, such as ``["--temperature", "0.8"]``.
+
+    Raises:
+        InputError: a run, audio, clip or folder that cannot be used, or flags that do not fit the run.
+    """
+    existing_run(options.run)
+    settings = sampling.sampling_settings(options.run, extra)
+    if options.settings:
+        print(f"# {type(settings).__name__}", *settings_lines(settings), sep="\n")
+        return
+    for name in ("audio", "out"):
+        if getattr(options, name) is None:
+            raise InputError(f"--{name} is needed (see 'a2g generate --help').")
+    clips.check_flags(options)
+    existing_file(options.audio)
+    clips.check_files(options)
+
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.io.audio import read_audio
+    from a2g_jax.training.run import open_run
+
+    keep_compilations()
+    opened = open_run(options.run)
+    trained = replace(opened, config=replace(opened.config, sampling=settings))
+    audio = read_audio(options.audio, trained.config.mel.sample_rate)
+    chosen = clips.sampler_of(trained, audio, options)
+    sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **chosen.about)
+    for line in chosen.report(Path(options.out)):
+        print(line)

@@ -1,0 +1,222 @@
+"""``a2g prepare``: a corpus from recordings, or a generated one."""
+
+import argparse
+import dataclasses
+import textwrap
+from typing import TYPE_CHECKING
+
+from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, seed
+from a2g_jax.cli.paths import existing_file, existing_folder
+from a2g_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from a2g_jax.data.corpus import Corpus
+    from a2g_jax.data.generated import TalkerOptions
+    from a2g_jax.data.settings import Features
+
+DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: the same command resumes."
+#: The generated corpus and the names of :data:`a2g_jax.data.datasets.NAMES`, whose readers import NumPy.
+READERS = (
+    *("talker", "folder", "trinity", "genea2022", "genea2023", "beat", "beat2", "zeroeggs"),
+    *("ted", "ted-expressive", "s2g", "pats", "show"),
+)
+#: Flags that only generated corpora have, and those that only recorded ones have.
+_GENERATED = ("minutes", "speakers", "emotions", "jitter", "fingers", "view", "on_demand")
+_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit")
+
+
+def _reader(text: str) -> str:
+    """A name of :data:`READERS`, or the path of a Python file."""
+    if text not in READERS and not text.endswith(".py"):
+        raise argparse.ArgumentTypeError(f"expected one of {', '.join(READERS)}, or a reader.py; got {text!r}")
+    return text
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g prepare``."""
+    parser.add_argument(
+        "reader", nargs="?", type=_reader, metavar="NAME", help="talker, a data set (see --list), or a reader.py"
+    )
+    parser.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
+    parser.add_argument("--list", action="store_true", help="list what can be prepared, and exit")
+    parser.add_argument("--out", metavar="CORPUS", help="folder to make")
+    parser.add_argument("--seed", type=seed, default=0, help="of the generated talk and of the splits (default: 0)")
+    parser.add_argument(
+        "--workers", type=count, help="processes; the corpus does not depend on it (default: one a core)"
+    )
+    parser.add_argument(
+        "--features", metavar="PAPER", help="rate, mel bands and poses of a paper (default: audio2gestures; see --list)"
+    )
+    parser.add_argument("--fps", type=frame_rate, help="frames per second (default: of the paper or the data set)")
+    parser.add_argument(
+        "--waveform", action="store_true", help="store the audio too, for models that compute their own features"
+    )
+    parser.add_argument(
+        "--pose",
+        choices=("6d", "exponential", "directions", "keypoints"),
+        help="representation of poses (default: of the paper, the data set or the view)",
+    )
+    recorded = parser.add_argument_group("recordings")
+    recorded.add_argument(
+        "--joints",
+        choices=("body", "upper-body", "all"),
+        help="body: any rig on 22 joints; upper-body: on 47 with fingers; all: the rig as it is (default: body)",
+    )
+    recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
+    recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")
+    recorded.add_argument("--limit", type=natural, help="maximum number of recordings")
+    generated = parser.add_argument_group("generated talk")
+    generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
+    generated.add_argument("--speakers", metavar="NAMES", help="speakers, comma-separated (default: all)")
+    generated.add_argument("--emotions", metavar="NAMES", help="emotions, comma-separated (default: all)")
+    generated.add_argument("--jitter", type=positive, metavar="DEGREES", help="capture noise on the generated motion")
+    generated.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the body's 22")
+    generated.add_argument(
+        "--view",
+        choices=("body", "beat", "ted", "ted-expressive", "s2g"),
+        help="show the speakers as a data set does: joints, bone directions or keypoints (default: body)",
+    )
+    generated.add_argument(
+        "--on-demand",
+        action="store_true",
+        help="store the first 60 minutes; the rest is for training and generated in training, 30 minutes at a time",
+    )
+
+
+def run(options: argparse.Namespace, _extra: list[str]) -> None:
+    """Prepare or generate the corpus, and print its size.
+
+    Raises:
+        InputError: flags that exclude each other, an unknown name, or a source or folder that cannot be used.
+    """
+    if options.list:
+        _list_data_sets()
+        return
+    if options.reader is None:
+        raise InputError("name what to prepare: 'a2g prepare talker', or a data set ('a2g prepare --list').")
+    if options.out is None:
+        raise InputError("--out is needed: the folder to make.")
+    corpus = _generated(options) if options.reader == "talker" else _recorded(options)
+    seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
+    kinds = {"directions": "bone directions", "keypoints": "keypoints"}
+    print(
+        f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
+        f" {corpus.rows} {kinds.get(corpus.representation, 'joints')} at {corpus.fps:g} fps ("
+        + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
+        + ")"
+    )
+    if corpus.on_demand:
+        roles = [role for part in corpus.later["parts"] for role in part]
+        minutes = sum(role["seconds"] for role in roles) / 60
+        print(
+            f"{len(roles)} more training recordings, {minutes:.1f} minutes in {corpus.parts - 1} parts, are generated"
+            " in training (a2g train --part-steps: steps on each part)"
+        )
+
+
+def _generated(options: argparse.Namespace) -> "Corpus":
+    if options.source is not None:
+        raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
+    _refuse(options, _RECORDED, "recordings; a generated corpus has the joints of --view and --fingers.")
+    speakers, emotions = _names("speakers", options.speakers), _names("emotions", options.emotions)
+
+    from a2g_jax.data.on_demand import OnDemand
+    from a2g_jax.data.prepare import prepare_talker, view_poses
+
+    view = options.view or "body"
+    if options.pose and options.pose not in view_poses(view):
+        raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
+    return prepare_talker(
+        options.out,
+        _talker_options(options, view, speakers, emotions),
+        _features(options),
+        workers=options.workers,
+        on_demand=OnDemand() if options.on_demand else None,
+    )
+
+
+def _talker_options(
+    options: argparse.Namespace, view: str, speakers: tuple[str, ...], emotions: tuple[str, ...]
+) -> "TalkerOptions":
+    from a2g_jax.data.generated import TalkerOptions
+    from a2g_jax.data.settings import find_features
+    from a2g_jax.talker.views.catalogue import find_view
+
+    fps = options.fps or (find_features(options.features).fps if options.features else find_view(view).fps)
+    return TalkerOptions(
+        minutes=options.minutes or 30.0,
+        seed=options.seed,
+        fps=fps,
+        speakers=speakers,
+        emotions=emotions,
+        jitter=options.jitter or 0.0,
+        fingers=options.fingers,
+        view=view,
+    )
+
+
+def _recorded(options: argparse.Namespace) -> "Corpus":
+    if options.source is None:
+        raise InputError(f"name the folder: a2g prepare {options.reader} SOURCE --out CORPUS.")
+    _refuse(options, _GENERATED, "'a2g prepare talker'; recordings are prepared as they are.")
+    if options.reader not in READERS:
+        existing_file(options.reader, "name a Python file that defines DATASET")
+    existing_folder(options.source)
+
+    from a2g_jax.data.datasets import find_data_set
+    from a2g_jax.data.prepare import prepare_data_set
+
+    reader = find_data_set(options.reader)
+    features = _features(options)
+    if options.features is None:
+        features = dataclasses.replace(features, fps=options.fps or reader.fps, pose=options.pose or reader.pose)
+    return prepare_data_set(
+        options.reader,
+        options.source,
+        options.out,
+        features,
+        seed=options.seed,
+        official=not options.random_split,
+        skip_broken=options.skip_broken,
+        limit=options.limit,
+        workers=options.workers,
+    )
+
+
+def _features(options: argparse.Namespace) -> "Features":
+    """The settings of a paper, changed by the flags."""
+    from a2g_jax.data.settings import find_features
+
+    features = find_features(options.features or "audio2gestures")
+    flags = {name: getattr(options, name) for name in ("fps", "pose", "joints", "waveform")}
+    return dataclasses.replace(features, **{name: value for name, value in flags.items() if value})
+
+
+def _refuse(options: argparse.Namespace, names: tuple[str, ...], reason: str) -> None:
+    for name in names:
+        if getattr(options, name) not in (None, False):
+            raise InputError(f"--{name.replace('_', '-')} is for {reason}")
+
+
+def _names(flag: str, text: str | None) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
+    if text is not None and not names:
+        raise InputError(f"--{flag}: empty list; leave it out for all.")
+    return names
+
+
+def _list_data_sets() -> None:
+    from a2g_jax.data.datasets import NAMES, find_data_set
+    from a2g_jax.data.settings import PRESETS
+
+    for name in NAMES:
+        reader = find_data_set(name)
+        print(f"{name}: {reader.title}, {reader.fps:g} fps")
+        if reader.about:
+            print(textwrap.indent(textwrap.fill(reader.about, 96), "    "))
+    print("talker: generated recordings with ground truth (see 'a2g talk')")
+    print("\nfeatures of the papers (--features):")
+    for name, features in PRESETS.items():
+        mel = f"{features.mel.bands} mel bands" + (f" x {features.mel.stack}" if features.mel.stack > 1 else "")
+        wave = ", waveform" if features.waveform else ""
+        print(f"{name}: {features.fps:g} fps, {mel}, {features.pose}, joints: {features.joints}{wave}")

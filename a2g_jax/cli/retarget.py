@@ -1,0 +1,72 @@
+"""``a2g retarget``: the motion of one rig on another."""
+
+import argparse
+from pathlib import Path
+
+from a2g_jax.cli.argument_types import frame_rate
+from a2g_jax.cli.paths import existing_file
+from a2g_jax.errors import InputError
+
+DESCRIPTION = "The motion of one rig on another: any humanoid BVH to any other, or to the body joints models train on."
+#: Targets other than a file: skeletons with the source's own bones.
+_OWN = ("body", "upper-body")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g retarget``."""
+    parser.add_argument("source", metavar="IN.bvh", help="the motion")
+    parser.add_argument(
+        "--to",
+        required=True,
+        metavar="TARGET",
+        help="a BVH file with the rig to move, or body (22 joints) or upper-body (47), with the source's own bones",
+    )
+    parser.add_argument("--out", required=True, metavar="OUT.bvh", help="file to write, in the target's layout")
+    parser.add_argument("--mirror", action="store_true", help="exchange left and right")
+    parser.add_argument(
+        "--fps", type=frame_rate, metavar="F", help="frames per second of the result (default: the source's)"
+    )
+
+
+def run(options: argparse.Namespace, _extra: list[str]) -> None:
+    """Match the joints, write the motion on the target, and print both.
+
+    Raises:
+        InputError: a file that cannot be read, or a rig that is not understood.
+    """
+    out = Path(options.out)
+    if out.suffix.lower() != ".bvh":
+        raise InputError(f"{out}: not written: a BVH file's name ends in .bvh.")
+    existing_file(options.source)
+    if options.to not in _OWN:
+        existing_file(options.to)
+
+    from a2g_jax.geometry.mirror import mirror
+    from a2g_jax.geometry.motion import resample
+    from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_skeleton
+    from a2g_jax.io.bvh import read_bvh, write_bvh
+    from a2g_jax.io.bvh_like import read_with_layout, write_like
+
+    source_path = Path(options.source)
+    motion = read_bvh(source_path)
+    source = find_rig(motion, name=str(source_path))
+    layout = None
+    if options.to in _OWN:
+        own = body_skeleton if options.to == "body" else upper_body_skeleton
+        target = find_rig(own(source), name=options.to)
+    else:
+        example, layout = read_with_layout(Path(options.to))
+        target = find_rig(example, name=options.to)
+    match = match_rigs(source, target)
+    moved = mirror(motion, source) if options.mirror else motion
+    moved = retarget(moved, match)
+    moved = moved if options.fps is None else resample(moved, options.fps)
+    errors: dict[str, float] = {}
+    if layout is None:
+        write_bvh(out, moved)
+    else:
+        errors = write_like(out, moved, layout)
+    print(match.table())
+    print(f"{out}: {moved.frames} frames of {moved.skeleton.joints} joints at {moved.fps:g} fps")
+    for joint, degrees in errors.items():
+        print(f"{joint} has too few rotation channels in the target: off by up to {degrees:.1f} degrees")

@@ -1,0 +1,81 @@
+"""Flags and output of the commands that generate motions with a run: ``a2g demo`` and ``a2g generate``."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from a2g_jax.cli.argument_types import count, formats, seed
+from a2g_jax.config import from_json, parse_flags
+from a2g_jax.generation.formats import PAGE, motion_formats
+from a2g_jax.models.registry import find_trained_model
+from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
+
+if TYPE_CHECKING:
+    from a2g_jax.generation.generator import Sampler
+    from a2g_jax.training.run import Run
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--samples``, ``--seed`` and ``--formats``."""
+    known = (*motion_formats(), PAGE)
+    parser.add_argument("--samples", type=count, default=5, help="number of motions (default: 5)")
+    parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument(
+        "--formats",
+        type=formats(known),
+        default=",".join(known),
+        help=f"any of {', '.join(known)}, comma-separated (default: all)",
+    )
+
+
+def sampling_settings(name: str, flags: list[str]) -> Any:
+    """Settings of generation of a run, changed by flags such as ``["--temperature", "0.8"]``.
+
+    Args:
+        name: a run folder, or the name of a shipped run.
+
+    Raises:
+        InputError: not a run, an unknown flag, or a value that does not fit it.
+    """
+    folder = run_folder(name)
+    values = read_description(folder)
+    entry = find_trained_model(str(values.get("model")), str(folder / RUN_FILE))
+    stored = from_json(entry.sampling, split_settings(entry, values)[1], str(folder / RUN_FILE))
+    (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
+    return changed
+
+
+def write_samples(
+    run: "Run", sampler: "Sampler", audio: Any, options: argparse.Namespace, title: str, **about: Any
+) -> None:
+    """Generate and write the samples with a progress bar, and print the number of files.
+
+    Args:
+        audio: (N,), mono, at the run's sample rate.
+        title: of the speech, for the page's heading.
+        about: further arguments of :func:`~a2g_jax.generation.export.export`.
+    """
+    from a2g_jax.generation.export import export
+    from a2g_jax.progress import progress_bar
+
+    with progress_bar(options.samples, "generating", "motion") as bar:
+        written = export(
+            run,
+            sampler,
+            audio,
+            options.out,
+            samples=options.samples,
+            seed=options.seed,
+            formats=options.formats,
+            title=title,
+            report=lambda done: bar.update(done - bar.n),
+            **about,
+        )
+    print_written(options.out, written)
+
+
+def print_written(out: str, written: dict[str, int]) -> None:
+    """Print the number of files of each format, and where the page is."""
+    print(f"{out}: {', '.join(f'{number} {kind}' for kind, number in written.items())}")
+    if PAGE in written:
+        print(f"open {Path(out) / 'index.html'} in a browser")

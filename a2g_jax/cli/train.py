@@ -1,0 +1,72 @@
+"""``a2g train``: train a model on a corpus."""
+
+import argparse
+
+from a2g_jax.cli.paths import existing_corpus, existing_features
+from a2g_jax.config import parse_flags, settings_lines
+from a2g_jax.errors import InputError
+from a2g_jax.models.registry import find_model, model_names
+
+DESCRIPTION = "Train a model on a corpus. Every setting of the model and the training is a flag too: see --settings."
+#: Further flags are settings.
+TAKES_SETTINGS = True
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g train``; those of settings are read later, since they depend on the model."""
+    parser.add_argument(
+        "model", metavar="MODEL", help=f"{', '.join(model_names())}, or package.module:ENTRY of another package"
+    )
+    parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
+    parser.add_argument("--out", metavar="RUN", help="folder of the run")
+    parser.add_argument(
+        "--preset",
+        default="tiny",
+        help="tiny: minutes on 2 cores; paper: as published; for stylized_flow also ted, moglow and moglow_styled"
+        " (default: tiny)",
+    )
+    parser.add_argument(
+        "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"
+    )
+    parser.add_argument("--resume", action="store_true", help="resume from the latest checkpoint")
+    parser.add_argument("--settings", action="store_true", help="list every setting with its value, and exit")
+
+
+def run(options: argparse.Namespace, extra: list[str]) -> None:
+    """Train, or list the settings.
+
+    Args:
+        extra: settings, such as ``["--learning-rate", "3e-4"]``.
+
+    Raises:
+        InputError: an unknown model, setting or preset, or a corpus, run or feature network that cannot be used.
+    """
+    entry = find_model(options.model)
+    if options.preset not in entry.presets:
+        raise InputError(f"{options.model} has no preset {options.preset!r}; there are: {', '.join(entry.presets)}.")
+    if not options.settings:
+        for name in ("corpus", "out"):
+            if getattr(options, name) is None:
+                raise InputError(f"--{name} is needed (see 'a2g train --help').")
+        existing_corpus(options.corpus)
+        existing_features(options.features)
+    published = entry.presets[options.preset], entry.training_preset(options.preset)
+    model, training = parse_flags(extra, *published, hint="'a2g train MODEL --settings'")
+    if options.settings:
+        for settings in (model, training):
+            print(f"# {type(settings).__name__}", *settings_lines(settings), sep="\n")
+        return
+
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.training.start import run_training
+
+    keep_compilations()
+    trained = run_training(
+        options.model, options.preset, model, training, options.corpus, options.out, options.resume, options.features
+    )
+    following = f"a2g generate {options.out} --audio speech.wav --out DIR"
+    if not trained.config.space.has_rotations:
+        following = f"a2g evaluate {options.out} --corpus {options.corpus} --out DIR"
+    if trained.config.build().sample is None:
+        following = f"a2g inspect {options.out}"
+    print(f"{options.out}: trained for {trained.steps} steps; next: {following}")

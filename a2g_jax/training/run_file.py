@@ -1,0 +1,65 @@
+"""The description of a run as it lies in its folder; importable without JAX."""
+
+import os
+from dataclasses import fields
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from a2g_jax.errors import InputError
+from a2g_jax.io.files import read_json
+from a2g_jax.models.entry import Entry
+
+FORMAT = "a2g_jax run"
+VERSION = 1
+RUN_FILE = "run.json"
+WEIGHTS_FILE = "weights.safetensors"
+
+#: Folders of the package by the names of the runs that are shipped with it.
+SHIPPED = {"demo": "demo", "demo-flow": "demo_flow"}
+#: The same of the shipped feature network.
+SHIPPED_FEATURES = {"demo": "demo_features"}
+
+#: Settings of generation that runs of version 0.1 kept among those of the model, by their names then.
+_MOVED = {"control_curves": "controls"}
+
+
+def run_folder(name: str | os.PathLike[str], shipped: dict[str, str] = SHIPPED) -> Path:
+    """The folder of a run: a path, or the name of a shipped one."""
+    if str(name) in shipped:
+        return Path(str(resources.files("a2g_jax"))) / shipped[str(name)]
+    return Path(name)
+
+
+def read_description(folder: Path) -> dict[str, Any]:
+    """The contents of ``run.json``.
+
+    Raises:
+        InputError: not a run, or one of another version.
+    """
+    about = folder / RUN_FILE
+    if not about.is_file():
+        raise InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
+    values = read_json(about)
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
+        raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
+    if values.get("version") != VERSION:
+        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it anew.")
+    return values
+
+
+def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Settings of the model and of generation; in runs of version 0.1 both stand together.
+
+    Args:
+        values: the contents of ``run.json``.
+    """
+    settings, sampling = dict(values["model_config"]), values.get("sampling")
+    if sampling is not None:
+        return settings, dict(sampling)
+    own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
+    moved = {name: _MOVED.get(name, name) for name in settings}
+    return (
+        {name: value for name, value in settings.items() if moved[name] not in own},
+        {moved[name]: value for name, value in settings.items() if moved[name] in own},
+    )
