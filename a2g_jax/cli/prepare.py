@@ -98,10 +98,9 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         raise InputError("--out is needed: the folder to make.")
     corpus = _generated(options) if options.reader == "talker" else _recorded(options)
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
-    kinds = {"directions": "bone directions", "keypoints": "keypoints"}
     print(
         f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
-        f" {corpus.rows} {kinds.get(corpus.representation, 'joints')} at {corpus.fps:g} fps ("
+        f" {corpus.rows} {corpus.space.noun} at {corpus.fps:g} fps ("
         + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
         + ")"
     )

@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.audio2gestures.pins import face, read_on_skeleton
+from a2g_jax.generation.clips import read_on_skeleton
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style, blend
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.io.audio import read_audio
 from a2g_jax.training.run import Run
 
@@ -120,5 +120,5 @@ def read_facing(clip: Clip, run: Run) -> Motion:
     """
     config = run.config
     motion = read_on_skeleton(clip.path, config.skeleton, config.fps)
-    usual = rotations_from_rows(np.asarray(config.statistics["pose"].mean)[None], config.representation)
-    return face(motion, np.asarray(usual[0, 0], np.float64))[0]
+    usual = config.space.mean_rotations(config.statistics["pose"].mean)
+    return face(motion, np.asarray(usual[0], np.float64))[0]
