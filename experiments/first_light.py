@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio

@@ -3,7 +3,7 @@
 import numpy as np
 
 from a2g_jax.cli import main
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.metrics.rhythm import agreement_with_null, wrist_speed
 from a2g_jax.talker.recordings import talk

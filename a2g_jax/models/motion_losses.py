@@ -12,7 +12,8 @@ from a2g_jax.geometry.rotation import geodesic_distance
 Positions = Float[Array, "B T J _"]
 
 
-def _joint_mean(per_joint: Float[Array, "B T J"], weights: Float[Array, " J"] | None) -> Float[Array, ""]:
+def joint_mean(per_joint: Float[Array, "B T J"], weights: Float[Array, " J"] | None) -> Float[Array, ""]:
+    """Mean over clips and frames of a weighted mean over joints."""
     if weights is None:
         return jnp.mean(per_joint)
     return jnp.mean(per_joint @ (weights / jnp.sum(weights)))
@@ -24,14 +25,14 @@ def rotation_loss(
     joint_weights: Float[Array, " J"] | None = None,
 ) -> Float[Array, ""]:
     """Mean geodesic angle between rotation matrices (Eq. 2), radians."""
-    return _joint_mean(geodesic_distance(predicted, target), joint_weights)
+    return joint_mean(geodesic_distance(predicted, target), joint_weights)
 
 
 def position_loss(
     predicted: Positions, target: Positions, joint_weights: Float[Array, " J"] | None = None
 ) -> Float[Array, ""]:
     """Mean L1 distance of joint positions (Eq. 3), metres."""
-    return _joint_mean(jnp.sum(jnp.abs(predicted - target), axis=-1), joint_weights)
+    return joint_mean(jnp.sum(jnp.abs(predicted - target), axis=-1), joint_weights)
 
 
 def speed_loss(

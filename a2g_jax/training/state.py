@@ -9,7 +9,7 @@ import optax
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
-from a2g_jax.models.base import Model, Params, Stage, Update
+from a2g_jax.models.base import Loss, Model, Params, Stage, Update
 from a2g_jax.models.optimiser import make_optimiser
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import StageSpan
@@ -108,14 +108,16 @@ def _gradient(update: Update, params: Params, key: Key[Array, ""], batch: Batch,
     return jax.value_and_grad(loss, has_aux=True)(trained(update, params))
 
 
-def held_out_loss(
-    stage: Stage, params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
-) -> tuple[Float[Array, ""], dict[str, Array]]:
-    """The loss of a stage on held-out clips, and its terms: its own, or the sum over its updates."""
-    if stage.validation_loss is not None:
-        return stage.validation_loss(params, key, batch, step)
-    first, *others = (update.loss(params, key, batch, step) for update in stage.updates)
-    total, terms = first[0], dict(first[1])
-    for loss, more in others:
-        total, terms = total + loss, {**terms, **more}
-    return total, terms
+def joint_loss(stage: Stage) -> Loss:
+    """The sum of the losses of a stage's updates, with the terms of all."""
+
+    def loss(
+        params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+    ) -> tuple[Float[Array, ""], dict[str, Array]]:
+        first, *others = (update.loss(params, key, batch, step) for update in stage.updates)
+        total, terms = first[0], dict(first[1])
+        for value, more in others:
+            total, terms = total + value, {**terms, **more}
+        return total, terms
+
+    return loss

@@ -13,7 +13,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Model, Params, Stage, Summary
 from a2g_jax.training.run import RunConfig
-from a2g_jax.training.state import held_out_loss
+from a2g_jax.training.state import joint_loss
 
 #: Most clips of a validation loss, and of the latent statistics.
 _VALIDATION_CLIPS, _SUMMARY_CLIPS = 64, 4096
@@ -58,7 +58,7 @@ def validate(
     totals: dict[str, float] = {}
     count = 0
     chosen, mean_pose = stage or model.stages[-1], config.statistics["pose"].mean
-    loss = jax.jit(lambda *given: held_out_loss(chosen, *given))
+    loss = jax.jit(chosen.validation_loss or joint_loss(chosen))
     rebuild = jax.jit(lambda *given: _rebuild(model.reconstruct, config.space, *given))
     for number, batch in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
         value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))

@@ -10,7 +10,7 @@ import numpy as np
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.models.base import Data
-from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig
+from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def _ours(config: Any, options: argparse.Namespace) -> dict[str, Any]:
     import numpy as np
 
     from a2g_jax.features.mel import log_mel
-    from a2g_jax.generation.engine import Generator
+    from a2g_jax.generation.generator import Generator
     from a2g_jax.training.run import Run
 
     rng = np.random.default_rng(options.seed)

@@ -9,7 +9,7 @@ from a2g_jax.data.corpus import Corpus, Entry
 from a2g_jax.data.splits import Segment
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
-from a2g_jax.models.audio2gestures import PRESETS
+from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.training.run import RunConfig
 

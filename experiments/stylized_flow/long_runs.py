@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.places import Body
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
 from a2g_jax.training.run import Run, open_run
 from experiments.tables.records import results

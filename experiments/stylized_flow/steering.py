@@ -19,7 +19,7 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.places import Body
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.style import HandStyle, hand_style

@@ -21,6 +21,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.data.batches import draw_starts, find_crops, gather
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.io.files import write_json
+from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state
 from experiments.stylized_flow.settings import flow, moglow
 from experiments.stylized_flow.table1 import ted_arguments
@@ -35,12 +36,12 @@ def stepper(variant: Variant, corpus: Corpus, where: Setting) -> Callable[[], No
     """Goes on by one turn, on a batch that is there already."""
     _, config = described("", variant, {}, 0, corpus, where)
     model, settings = config.build(), config.train_config
-    state = init_state(model, settings)
+    state = init_state(model, stage_spans(model, settings), settings.seed)
     rows = draw_starts(jax.random.key(0), find_crops(corpus, "train", model.clip_frames), settings.batch_size)
     clips = [gather(jax.device_put(np.asarray(a)), rows, model.clip_frames) for a in (corpus.audio, corpus.pose)]
     batch = Batch(*clips)
     step = jax.jit(
-        lambda state: advance(model, settings, state, batch, jax.random.fold_in(state.key, state.step)),
+        lambda state: advance(stage_spans(model, settings)[0], state, batch, jax.random.fold_in(state.key, state.step)),
         donate_argnums=0,
     )
 

@@ -15,7 +15,7 @@ from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regress
 from a2g_jax.evaluation.likelihood import bits_per_dim, fit_gaussian, gaussian_bits_per_dim, told_rows
 from a2g_jax.evaluation.likelihood_clips import clip_batches, clip_starts
 from a2g_jax.features.mel import MelConfig
-from a2g_jax.models.stylized_flow import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import Run, RunConfig
@@ -113,7 +113,7 @@ def test_bits_of_a_flow_are_those_of_its_score(run, corpus):
     found = bits_per_dim(run, corpus)
     (start, *_), model = clip_starts(run.config, corpus, "test"), run.config.build()
     audio = run.config.statistics["audio"].normalise(np.asarray(corpus.audio[start : start + 24]))
-    nats = jax.jit(model.score)(run.params, audio[None], np.asarray(corpus.pose[start : start + 24])[None])
+    nats = jax.jit(model.density.log_likelihood)(run.params, audio[None], np.asarray(corpus.pose[start : start + 24])[None])
     np.testing.assert_allclose(found.clean_clips[0], -np.mean(nats) / (66 * math.log(2)), rtol=1e-5)
     assert found.clean.low < found.clean.mean < found.clean.high
     np.testing.assert_allclose(found.noisy.mean, found.noisy_clips.mean(), rtol=1e-12)

@@ -12,6 +12,7 @@ from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import speech2gesture
 from a2g_jax.models.base import Data
+from a2g_jax.training.state import joint_loss
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_speech2gesture")
@@ -73,10 +74,10 @@ def _compare(representation, dtype, output, tolerance):
     model, params, batch, twin = _setting(representation, dtype)
 
     def terms(params):
-        values = model.loss(params, jax.random.key(0), batch, jnp.int32(0))[1]
+        values = joint_loss(model.stages[0])(params, jax.random.key(0), batch, jnp.int32(0))[1]
         return jnp.stack([values[name] for name in sorted(values)])
 
-    names = sorted(jax.eval_shape(model.loss, params, jax.random.key(0), batch, jnp.int32(0))[1])
+    names = sorted(jax.eval_shape(joint_loss(model.stages[0]), params, jax.random.key(0), batch, jnp.int32(0))[1])
 
     @jax.jit
     def ours_with_gradients(params):

@@ -11,7 +11,7 @@ import pytest
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.models.base import Data
-from a2g_jax.models.stylized_flow import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.nn.flow.invertible import FIXED
 from a2g_jax.nn.flow.priors import log_prob
@@ -68,7 +68,7 @@ def test_latents_log_determinants_and_inverse_agree(setting):
 
     @jax.jit
     def ours(params, flat, audio):
-        told = networks.told(params, audio, flat, setting.seen)
+        told = networks.conditioning(params, audio, flat, setting.seen)
         inner = networks.inner(flat)
         return inner, *networks.latents(params, inner, told), networks.motion(params, setting.z, told)
 
@@ -89,7 +89,7 @@ def test_sampling_frame_by_frame_agrees(setting, precompute):
 
     @jax.jit
     def ours(params, audio, z):
-        heard = networks.heard(params, audio[: z.shape[0]])
+        heard = networks.audio_context(params, audio[: z.shape[0]])
         return networks.proceed(params, z, heard, networks.start(params, CLIPS))[0]
 
     x = ours(setting.params, audio, jnp.swapaxes(z, 0, 1))
@@ -101,7 +101,7 @@ def test_losses_and_gradients_agree(setting):
     config, networks = setting.config, setting.networks
 
     def terms(params):
-        told = networks.told(params, setting.audio, setting.flat, setting.seen)
+        told = networks.conditioning(params, setting.audio, setting.flat, setting.seen)
         inner = networks.inner(setting.flat)
         z, log_det = networks.latents(params, inner, told)
         bits = -jnp.mean(log_prob(z, config.freedom) + log_det) / math.log(2.0)

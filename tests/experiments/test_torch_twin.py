@@ -15,8 +15,10 @@ from a2g_jax.models import audio2gestures
 from a2g_jax.models.audio2gestures import objective
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.base import Data
-from a2g_jax.models.motion_autoencoder import MotionAutoencoderConfig, encode
-from a2g_jax.models.motion_autoencoder import build as build_autoencoder
+from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig
+from a2g_jax.models.motion_autoencoder.config import build as build_autoencoder
+from a2g_jax.models.motion_autoencoder.model import encode
+from a2g_jax.training.state import joint_loss
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_twin")
@@ -130,11 +132,11 @@ def _compare(dtype, tolerance, config=CONFIG):
     model = audio2gestures.build(config, data)
     theirs = twin.terms(_torch(batch.audio), _torch(batch.pose), _noise(key, dtype, config))
     weighted = set(objective.weights(config)(jnp.int32(0)))
-    names = sorted(weighted & set(jax.eval_shape(model.loss, params, key, batch, jnp.int32(0))[1]))
+    names = sorted(weighted & set(jax.eval_shape(joint_loss(model.stages[0]), params, key, batch, jnp.int32(0))[1]))
     assert sorted(theirs) == names
 
     def terms(params):
-        values = model.loss(params, key, batch, jnp.int32(0))[1]
+        values = joint_loss(model.stages[0])(params, key, batch, jnp.int32(0))[1]
         return jnp.stack([values[name] for name in names])
 
     @jax.jit

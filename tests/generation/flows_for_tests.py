@@ -12,7 +12,8 @@ from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
-from a2g_jax.models.stylized_flow import StylizedFlowConfig, build
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.model import build
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import Run, RunConfig
@@ -73,7 +74,7 @@ def run_of(pose="6d", controls=()):
     about = RunConfig("stylized_flow", "tiny", config, TrainConfig(), 30.0, MEL, body, pose, statistics, corpus)
     model = build(config, about.data())
     batch = Batch(np.asarray(statistics["audio"].normalise(audio), np.float32), poses)
-    params = jax.jit(model.warm_start)(jax.jit(model.init)(jax.random.key(0)), batch)
+    params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch)
     kernel = params["glow"]["coupling"]["out_kernel"]
     params["glow"]["coupling"]["out_kernel"] = 0.3 * jax.random.normal(jax.random.key(1), kernel.shape)
     summary = {"control_mean": np.linspace(0.1, 0.5, 5, dtype=np.float32)[:, None]} if controls else {}

@@ -10,8 +10,8 @@ import pytest
 from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation import engine as module
-from a2g_jax.generation.engine import Generator
 from a2g_jax.generation.formats import check_formats
+from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.rotation import matrix_from_euler

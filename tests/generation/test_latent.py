@@ -5,7 +5,7 @@ import pytest
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
-from a2g_jax.generation.engine import Generator
+from a2g_jax.generation.generator import Generator
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import demo_run
 

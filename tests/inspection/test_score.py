@@ -20,7 +20,7 @@ from a2g_jax.inspection.likelihood import score_motion
 from a2g_jax.inspection.unlikely import acceleration_changes, unlikely_moments
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
-from a2g_jax.models.stylized_flow import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.loop import train

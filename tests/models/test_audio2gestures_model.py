@@ -14,10 +14,11 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS, find_model
-from a2g_jax.models.audio2gestures import PRESETS, build
+from a2g_jax.models.audio2gestures.config import PRESETS
+from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.audio2gestures.objective import weights as loss_weights
-from a2g_jax.models.base import Data
+from a2g_jax.models.base import Condition, Data
 
 CONFIG = replace(
     PRESETS["tiny"],
@@ -236,7 +237,7 @@ def test_samples_do_not_depend_on_windows(params, redraw_frames, sample_codes):
 
     @jax.jit
     def sample(audio, key, start):
-        return model.sample(params, SUMMARY, key, model.condition(params, audio), start)
+        return model.sample(params, SUMMARY, key, model.condition(params, {}, Condition(audio)), start)
 
     key = jax.random.key(0)
     whole = np.asarray(sample(AUDIO, key, jnp.int32(0)))

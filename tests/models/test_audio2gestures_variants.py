@@ -16,9 +16,11 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.rotation import matrix_to_6d
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.models.audio2gestures import PRESETS, build
 from a2g_jax.models.audio2gestures.codec import Codec
-from a2g_jax.models.base import Data
+from a2g_jax.models.audio2gestures.config import PRESETS
+from a2g_jax.models.audio2gestures.model import build
+from a2g_jax.models.base import Condition, Data
+from a2g_jax.training.state import joint_loss
 
 BANDS, JOINTS, FRAMES = 5, 4, 32
 RNG = np.random.default_rng(0)
@@ -90,7 +92,7 @@ def test_every_parameter_learns(name):
     data = OTHER_POSES.get(name, DATA)
     model = build(replace(BASE, **VARIANTS.get(name, {})), data)
     params = params_of(model)
-    step = jax.jit(jax.value_and_grad(model.loss, has_aux=True))
+    step = jax.jit(jax.value_and_grad(joint_loss(model.stages[0]), has_aux=True))
     (loss, terms), gradient = step(params, jax.random.key(0), batch(data), jnp.int32(5))
     assert np.isfinite(loss)
     assert all(np.isfinite(value) for value in terms.values())
@@ -106,10 +108,10 @@ def test_exponential_maps_are_the_rotations_they_stand_for():
     """The losses on poses see the same body whichever way its rotations are written down."""
     pose = jnp.asarray(np.random.default_rng(4).normal(scale=0.5, size=(2, FRAMES, JOINTS, 3)), jnp.float32)
     networks = Codec(BASE, EXPONENTIAL)
-    rotations, places = networks.places(pose)
+    rotations, places = networks.positions(pose)
     expected = Rotation.from_rotvec(np.asarray(pose).reshape(-1, 3)).as_matrix().reshape(*pose.shape, 3)
     np.testing.assert_allclose(rotations, expected, atol=1e-5)
-    same = Codec(BASE, DATA).places(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
+    same = Codec(BASE, DATA).positions(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
     np.testing.assert_allclose(places, same[1], atol=1e-5)
     np.testing.assert_array_equal(networks.valid(pose, rotations), pose)
 
@@ -124,7 +126,7 @@ def test_windows_give_the_motion_of_one_pass(name):
 
     @jax.jit
     def sample(audio, start):
-        return model.sample(params, summary, jax.random.key(0), model.condition(params, audio), start)
+        return model.sample(params, summary, jax.random.key(0), model.condition(params, {}, Condition(audio)), start)
 
     whole, window = np.asarray(sample(audio, jnp.int32(0))), np.asarray(sample(audio[128:], jnp.int32(128)))
     np.testing.assert_allclose(window[model.halo :], whole[128 + model.halo :], atol=2e-5)
@@ -138,7 +140,7 @@ def test_a_gru_forgets_within_its_context():
     random = np.random.default_rng(8)
     audio = random.normal(size=(640, BANDS)).astype(np.float32)
     other = np.concatenate([random.normal(size=(128, BANDS)).astype(np.float32), audio[128:]])
-    encode = jax.jit(lambda audio: model.condition(params, audio).mean)
+    encode = jax.jit(lambda audio: model.condition(params, {}, Condition(audio)).mean)
     first, second = np.asarray(encode(audio))[0], np.asarray(encode(other))[0]
     assert np.abs(first - second)[:128].max() > 0.1
     assert np.abs(first - second)[128 + 256 :].max() < 1e-5
@@ -167,12 +169,12 @@ def test_edits_are_made_in_generation_alone():
     audio = batch(DATA, 128).audio[0]
 
     def sample(model, key):
-        return model.sample(params, summary, key, model.condition(params, audio), jnp.int32(0))
+        return model.sample(params, summary, key, model.condition(params, {}, Condition(audio)), jnp.int32(0))
 
     first, second = (sample(edited, jax.random.key(n)) for n in (0, 1))
     np.testing.assert_allclose(first, second, atol=1e-5)  # nothing that is drawn is left
     assert np.abs(np.asarray(sample(plain, jax.random.key(0)) - sample(plain, jax.random.key(1)))).max() > 1e-3
-    one, two = (model.loss(params, jax.random.key(0), batch(DATA), jnp.int32(0))[0] for model in (plain, edited))
+    one, two = (joint_loss(model.stages[0])(params, jax.random.key(0), batch(DATA), jnp.int32(0))[0] for model in (plain, edited))
     assert one == two
 
 
@@ -191,10 +193,10 @@ def test_gradients_of_structured_and_perceptual_losses(x64):
 
     def loss(bias):
         decoder = {**params["decoder"], "Dense_0": {**params["decoder"]["Dense_0"], "bias": bias}}
-        return model.loss({**params, "decoder": decoder}, jax.random.key(0), clips, jnp.int32(5))[0]
+        return joint_loss(model.stages[0])({**params, "decoder": decoder}, jax.random.key(0), clips, jnp.int32(5))[0]
 
     check_grads(jax.jit(loss), (bias,), order=1, modes=["rev"], atol=1e-3, rtol=1e-3)
-    terms = model.loss(params, jax.random.key(0), clips, jnp.int32(5))[1]
+    terms = joint_loss(model.stages[0])(params, jax.random.key(0), clips, jnp.int32(5))[1]
     assert min(terms[name] for name in ("stft", "ssim", "lpips")) > 0
 
 

@@ -12,11 +12,13 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.models.base import Data
-from a2g_jax.models.stylized_flow import StylizedFlowConfig, build
+from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
+from a2g_jax.models.stylized_flow.model import build
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.nn.flow.invertible import FIXED
-from a2g_jax.training.state import advance, init_state
+from a2g_jax.training.stages import stage_spans
+from a2g_jax.training.state import advance, init_state, joint_loss
 
 SMALL = StylizedFlowConfig(
     flow_steps=3,
@@ -72,7 +74,7 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
     def latents(inner):
         """Of the whole clip: a pose changes what all frames after it are told, too."""
         clip = flat.at[:, first:stop].set(inner.reshape(1, stop - first, 4))
-        return networks.latents(params, networks.inner(clip), networks.told(params, batch.audio, clip))[0].ravel()
+        return networks.latents(params, networks.inner(clip), networks.conditioning(params, batch.audio, clip))[0].ravel()
 
     inner = flat[:, first:stop].ravel()
     both = jax.jit(lambda inner: (latents(inner), jax.jacrev(latents)(inner)))
@@ -84,7 +86,7 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
         else stats.multivariate_normal(np.zeros(4))
     )
     expected = prior.logpdf(z).sum() + np.linalg.slogdet(jacobian)[1]
-    score = jax.jit(model.score)(params, batch.audio, batch.pose)
+    score = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
     assert score.shape == (1, 5)
     np.testing.assert_allclose(score.sum(), expected, rtol=1e-9)
     # What an early frame is scored by is a part of the Jacobian: no later frame reaches back into it.
@@ -98,8 +100,8 @@ def test_without_noise_the_score_is_what_training_lowers():
     config = replace(SMALL, input_noise=0.0, global_channels=0)
     model, batch = build(config, DATA), jax.tree.map(lambda a: a.astype(jnp.float32), batch_of(3))
     params = jax.jit(model.init)(jax.random.key(0))
-    bits, _ = jax.jit(model.loss)(params, jax.random.key(1), batch, jnp.int32(0))
-    score = jax.jit(model.score)(params, batch.audio, batch.pose)
+    bits, _ = jax.jit(joint_loss(model.stages[0]))(params, jax.random.key(1), batch, jnp.int32(0))
+    score = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
     np.testing.assert_allclose(-score.mean() / np.log(2), bits, rtol=1e-5)
 
 
@@ -107,8 +109,8 @@ def test_sixteen_steps_invert_after_training():
     config = replace(SMALL, flow_steps=16, hidden=8, frame_dropout=0.4, clip_frames=24, global_channels=0)
     model, networks = build(config, DATA), FlowNetworks(config, DATA)
     settings = TrainConfig(steps=80, learning_rate=5e-3, clip_value=5.0, clip_norm=100.0)
-    state = init_state(model, settings)
-    step = jax.jit(lambda state, batch, key: advance(model, settings, state, batch, key))
+    state = init_state(model, stage_spans(model, settings), settings.seed)
+    step = jax.jit(lambda state, batch, key: advance(stage_spans(model, settings)[0], state, batch, key))
     as_single = lambda batch: jax.tree.map(lambda a: a.astype(jnp.float32), batch)  # noqa: E731
     history = []
     for number in range(80):
@@ -118,7 +120,7 @@ def test_sixteen_steps_invert_after_training():
 
     def back_and_forth(params, audio, pose):
         flat = networks.flat(pose)
-        told = networks.told(params, audio, flat)
+        told = networks.conditioning(params, audio, flat)
         z, _ = networks.latents(params, networks.inner(flat), told)
         return networks.inner(flat), networks.motion(params, z, told)
 

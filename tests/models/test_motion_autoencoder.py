@@ -11,7 +11,9 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.base import Data
-from a2g_jax.models.motion_autoencoder import PRESETS, MotionAutoencoderConfig, build, encode
+from a2g_jax.models.motion_autoencoder.config import PRESETS, MotionAutoencoderConfig
+from a2g_jax.models.motion_autoencoder.model import build, encode
+from a2g_jax.training.state import joint_loss
 
 SMALL = MotionAutoencoderConfig(encoder_channels=(8, 8, 8, 16, 4), decoder_channels=(4, 8), clip_frames=16)
 CHAIN = Skeleton(np.array([[0, 0, 0], [0, 0.3, 0], [0.2, 0, 0]], np.float32), ("a", "b", "c"), (-1, 0, 1))
@@ -66,7 +68,7 @@ def test_it_learns_to_give_back_what_it_is_given(representation):
 
     @jax.jit
     def step(params, state):
-        (loss, _), gradient = jax.value_and_grad(model.loss, has_aux=True)(
+        (loss, _), gradient = jax.value_and_grad(joint_loss(model.stages[0]), has_aux=True)(
             params, jax.random.key(0), batch, jnp.int32(0)
         )
         updates, state = optimiser.update(gradient, state)

@@ -16,9 +16,11 @@ from a2g_jax.geometry.pose_space import WIDTHS
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import find_model
-from a2g_jax.models.base import Data
-from a2g_jax.models.speech2gesture import PRESETS, build
+from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.speech2gesture.config import PRESETS
+from a2g_jax.models.speech2gesture.model import build
 from a2g_jax.models.speech2gesture.networks import generator_halo
+from a2g_jax.training.state import joint_loss
 
 CONFIG = replace(
     PRESETS["tiny"],
@@ -68,7 +70,7 @@ def make_params(model, dtype=np.float32):
 
 
 def terms_of(model, params, batch):
-    return model.loss(params, jax.random.key(0), batch, jnp.int32(0))
+    return joint_loss(model.stages[0])(params, jax.random.key(0), batch, jnp.int32(0))
 
 
 EXPECTED = {
@@ -215,7 +217,7 @@ def test_samples_do_not_depend_on_windows():
 
     @jax.jit
     def sample(audio, key, start):
-        return model.sample(params, {}, key, model.condition(params, audio), start)
+        return model.sample(params, {}, key, model.condition(params, {}, Condition(audio)), start)
 
     key = jax.random.key(0)
     whole = np.asarray(sample(AUDIO, key, jnp.int32(0)))
@@ -240,7 +242,7 @@ def test_halo_is_how_far_an_output_sees(depth):
     middle = frames // 2
 
     def change(frame):
-        return jax.grad(lambda a: jnp.sum(jnp.sin(model.condition(params, a)[frame])))(audio)
+        return jax.grad(lambda a: jnp.sum(jnp.sin(model.condition(params, {}, Condition(a))[frame])))(audio)
 
     seen = np.abs(np.asarray(jax.jit(jax.vmap(change))(jnp.arange(middle, middle + stride)))).sum(axis=-1) > 0
     reach = 0

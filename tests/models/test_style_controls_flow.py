@@ -13,11 +13,13 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS
-from a2g_jax.models.base import Data
-from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
+from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import asked, measure, parse_curves, scaled
+from a2g_jax.models.stylized_flow.model import build
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.train_config import TrainConfig, training_preset
+from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state
 
 CONFIG = StylizedFlowConfig(
@@ -58,8 +60,8 @@ def batch_of(clips=8, frames=20, seed=0):
 def trained():
     """Weights after sixty steps, and the summary of some clips."""
     model = build(CONFIG, DATA)
-    state = init_state(model, SETTINGS)
-    step = jax.jit(lambda state, batch, key: advance(model, SETTINGS, state, batch, key)[0])
+    state = init_state(model, stage_spans(model, SETTINGS), SETTINGS.seed)
+    step = jax.jit(lambda state, batch, key: advance(stage_spans(model, SETTINGS)[0], state, batch, key)[0])
     for number in range(60):
         state = step(state, batch_of(seed=number), jax.random.key(number))
     return state.params, jax.jit(model.summarise)(state.params, jax.random.key(0), batch_of(clips=64, seed=99))
@@ -72,7 +74,7 @@ def generated(trained, *curves, frames=128):
     """Heights of the hands at every frame of a motion."""
     model = build(replace(CONFIG, control_curves=curves), DATA)
     params, summary = trained
-    heard = jax.jit(model.condition)(params, batch_of(clips=1, frames=frames, seed=5).audio[0])
+    heard = jax.jit(model.condition)(params, {}, Condition(batch_of(clips=1, frames=frames, seed=5).audio[0]))
     pose = jax.jit(model.sample)(params, summary, jax.random.key(1), heard, jnp.int32(0))
     return np.asarray(heights_of(pose[None])[0, :, 0])
 
@@ -111,14 +113,14 @@ def test_the_share_of_controls_is_that_of_training(trained):
 
     @jax.jit
     def one_by_one(params):
-        heard = networks.steered(params, networks.heard(params, batch.audio[0]), controls)
+        heard = networks.steered(params, networks.audio_context(params, batch.audio[0]), controls)
         return networks.proceed(params, z[:, None], heard, networks.start(params, 1))[0][:, 0]
 
     @jax.jit
     def at_once(params, before):
         ends = ((0, 0), (CONFIG.history_frames, CONFIG.lookahead_frames), (0, 0))
         clip = [jnp.pad(values, ends) for values in (batch.audio, before[None], controls[None])]
-        return networks.motion(params, z[None], networks.told(params, *clip[:2], None, clip[2]))[0]
+        return networks.motion(params, z[None], networks.conditioning(params, *clip[:2], None, clip[2]))[0]
 
     made = one_by_one(params)
     np.testing.assert_allclose(at_once(params, made), made, atol=1e-4)

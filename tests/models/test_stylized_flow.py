@@ -11,11 +11,12 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.models.base import Data
-from a2g_jax.models.stylized_flow import PRESETS, StylizedFlowConfig, build
-from a2g_jax.models.stylized_flow.model import draw_latents
+from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
+from a2g_jax.models.stylized_flow.model import build, draw_latents
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state, learning_rate
 
 SMALL = StylizedFlowConfig(
@@ -54,8 +55,8 @@ def batch_of(clips=4, frames=24, seed=0):
 
 def trained(config, steps=60):
     model = build(config, DATA)
-    state = init_state(model, SETTINGS)
-    step = jax.jit(lambda state, batch, key: advance(model, SETTINGS, state, batch, key))
+    state = init_state(model, stage_spans(model, SETTINGS), SETTINGS.seed)
+    step = jax.jit(lambda state, batch, key: advance(stage_spans(model, SETTINGS)[0], state, batch, key))
     history = []
     for number in range(steps):
         state, metrics = step(state, batch_of(seed=number % 5), jax.random.key(number))
@@ -71,7 +72,7 @@ def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
     networks = FlowNetworks(config, DATA)
     audio = batch_of(clips=1, frames=128).audio[0]
     key = jax.random.key(7)
-    heard = jax.jit(model.condition)(state.params, audio)
+    heard = jax.jit(model.condition)(state.params, {}, Condition(audio))
     pose = jax.jit(model.sample)(state.params, {}, key, heard, jnp.int32(0))
     assert pose.shape == (128, *SHAPE)
     # Sampled frame by frame; encoded all at once, with the same poses before and the same silence around.
@@ -86,9 +87,9 @@ def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
 
 def test_a_motion_in_two_parts_is_the_motion_in_one():
     model = build(SMALL, DATA)
-    params = jax.jit(model.warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
+    params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=256).audio[0]
-    heard = jax.jit(model.condition)(params, audio)
+    heard = jax.jit(model.condition)(params, {}, Condition(audio))
     whole = jax.jit(model.sample)(params, {}, key, heard, jnp.int32(0))
     carried, parts = jax.jit(model.begin)(params, {}, key), []
     proceed = jax.jit(model.proceed)
@@ -101,9 +102,9 @@ def test_a_motion_in_two_parts_is_the_motion_in_one():
 
 def test_poses_beyond_those_of_training_are_drawn_back_and_no_others_are():
     model = build(MOGLOW, DATA)
-    params = jax.jit(model.warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
+    params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=128).audio[0]
-    heard, sample = jax.jit(model.condition)(params, audio), jax.jit(model.sample)
+    heard, sample = jax.jit(model.condition)(params, {}, Condition(audio)), jax.jit(model.sample)
     free = sample(params, {}, key, heard, jnp.int32(0))
 
     def within(low, high):
@@ -130,9 +131,9 @@ def test_the_summary_has_the_range_of_every_clip():
 def test_the_first_step_fits_the_actnorms_and_no_other_does():
     model = build(SMALL, DATA)
     frozen = TrainConfig(steps=5, learning_rate=1e-12)
-    state = init_state(model, frozen)
-    fitted = jax.jit(model.warm_start)(state.params, batch_of(seed=1))
-    step = jax.jit(lambda state, batch: advance(model, frozen, state, batch, jax.random.key(0))[0])
+    state = init_state(model, stage_spans(model, frozen), frozen.seed)
+    fitted = jax.jit(model.stages[0].warm_start)(state.params, batch_of(seed=1))
+    step = jax.jit(lambda state, batch: advance(stage_spans(model, frozen)[0], state, batch, jax.random.key(0))[0])
     state = step(state, batch_of(seed=1))
     state = step(state, batch_of(seed=2))
     for ours, theirs in zip(jax.tree.leaves(state.params), jax.tree.leaves(fitted), strict=True):
@@ -143,7 +144,7 @@ def test_told_poses_are_those_before_and_audio_those_around():
     config = replace(SMALL, global_channels=0)
     networks = FlowNetworks(config, DATA)
     audio, flat = jnp.arange(24.0)[None, :, None] * jnp.ones((1, 1, 4)), jnp.arange(24.0)[None, :, None]
-    told = networks.told({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
+    told = networks.conditioning({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
     assert told.history.shape == (1, 19, 18)
     np.testing.assert_array_equal(told.history[0, 0].reshape(3, 6)[:, 0], [0, 1, 2])
     np.testing.assert_array_equal(told.known[0, 0].reshape(6, 4)[:, 0], [0, 1, 2, 3, 4, 5])

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from a2g_jax.models.audio2gestures.networks import Gaussian
-from a2g_jax.models.motion_losses import Positions as Positions
+from a2g_jax.models.motion_losses import Positions, joint_mean
 from a2g_jax.models.motion_losses import position_loss as position_loss
 from a2g_jax.models.motion_losses import rotation_loss as rotation_loss
 from a2g_jax.models.motion_losses import speed_loss as speed_loss
@@ -41,7 +41,7 @@ def relaxed_loss(
         threshold: rho, metres.
     """
     distance = jnp.sum(jnp.abs(predicted - target), axis=-1)
-    return _joint_mean(jnp.maximum(distance - threshold, 0.0), joint_weights)
+    return joint_mean(jnp.maximum(distance - threshold, 0.0), joint_weights)
 
 
 def bicycle_loss(code: Float[Array, "B T C"], recovered: Float[Array, "B T C"]) -> Float[Array, ""]:
