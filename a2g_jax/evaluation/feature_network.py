@@ -34,7 +34,9 @@ class FeatureNetwork:
 
     @cached_property
     def _blocks(self) -> Any:
-        return jax.jit(self.run.config.build().features)
+        features = self.run.config.build().features
+        assert features is not None
+        return jax.jit(features)
 
     def blocks(self, pose: Float[np.ndarray, "B T R D"]) -> list[Float[np.ndarray, "B T _"]]:
         """Features of every residual block, frame by frame."""

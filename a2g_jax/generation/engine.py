@@ -122,12 +122,13 @@ class Engine:
         # The quietest value is what silence looks like after the features' floor.
         silence = float(np.min(given.audio))
         padded = np.pad(given.audio, (around, (0, 0)), constant_values=silence)
-        audio = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
-        emotion = None if given.emotion is None else np.pad(given.emotion, (around, (0, 0)), mode="edge")
-        words = None if given.words is None else np.pad(given.words, (around,))
+        audio: Any = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
+        emotion: Any = None if given.emotion is None else np.pad(given.emotion, (around, (0, 0)), mode="edge")
+        words: Any = None if given.words is None else np.pad(given.words, (around,))
         latents = None
         if given.latents is not None:
-            latents = Latents(*(np.pad(np.asarray(part), (around, (0, 0)), mode="edge") for part in given.latents))
+            parts: Any = [np.pad(np.asarray(part), (around, (0, 0)), mode="edge") for part in given.latents]
+            latents = Latents(*parts)
         for start in range(0, count * window, window):
             rows = slice(start, start + window + 2 * halo)
             cut = Condition(

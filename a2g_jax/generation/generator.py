@@ -93,7 +93,8 @@ class Generator:
 
     def rows(self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0, **given: Any) -> Iterator[Rows]:
         """Different motions in the run's pose space, for log-mel features, not normalised."""
-        yield from self.engine.rows(Condition(audio=features, **given), samples, seed)
+        audio: Any = features
+        yield from self.engine.rows(Condition(audio, **given), samples, seed)
 
 
 def audio_frames(run: Run, audio: Audio) -> int:

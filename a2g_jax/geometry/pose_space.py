@@ -216,7 +216,8 @@ def _rotations(pose, kind: _Kind):
 
 @partial(jax.jit, static_argnums=2)
 def _positions(pose, offsets, kind: _Kind):
-    return joint_positions(kind.space.rotations(jnp.asarray(pose)), offsets, kind.space.skeleton.parents)
+    rotations: Any = kind.space.rotations(jnp.asarray(pose))
+    return joint_positions(rotations, offsets, kind.space.skeleton.parents)
 
 
 def layout_rows(layout: PoseLayout, kind: str) -> int:

@@ -58,7 +58,7 @@ def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any]
     if sampling is not None:
         return settings, dict(sampling)
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
-    moved = {name: _MOVED.get(name, name) for name in settings}
+    moved = {str(name): _MOVED.get(name, name) for name in settings}
     return (
         {name: value for name, value in settings.items() if moved[name] not in own},
         {moved[name]: value for name, value in settings.items() if moved[name] in own},

@@ -79,7 +79,8 @@ def advance(span: StageSpan, state: TrainState, batch: Batch, key: Key[Array, ""
     step = state.step - span.first if span.first else state.step
     if (warm_start := stage.warm_start) is not None:
         params = jax.lax.cond(step == 0, lambda p: warm_start(p, batch), lambda p: p, params)
-    good, metrics, total = state.good, {}, jnp.zeros(())
+    good, total = state.good, jnp.zeros(())
+    metrics: Metrics = {}
     optimisers = dict(state.optimisers)
     single = len(stage.updates) == 1
     for number, update in enumerate(stage.updates):

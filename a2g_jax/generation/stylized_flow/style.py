@@ -14,6 +14,7 @@ from frame to frame, as draws are; where those of a clip are slower, ``statistic
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -76,7 +77,8 @@ def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
     else:
         mean = np.broadcast_to(style.share * style.mean, (frames, channels))
         scale = np.sqrt(style.share**2 * style.std**2 + rest)
-    return Latents(np.asarray(mean, np.float32), np.tile(np.asarray(scale, np.float32), (frames, 1)))
+    parts: Any = np.asarray(mean, np.float32), np.tile(np.asarray(scale, np.float32), (frames, 1))
+    return Latents(*parts)
 
 
 def there_and_back(frames: int, length: int) -> Int[np.ndarray, " frames"]:

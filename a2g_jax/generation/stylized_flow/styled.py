@@ -107,7 +107,7 @@ class Styled:
     style: Style | None
     seed_poses: Motion | None
 
-    def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int) -> Iterator[Motion]:
+    def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Samples, one after another."""
         yield from self.space.stream(audio, samples, seed, self.style, self.seed_poses)
 

@@ -90,7 +90,8 @@ def build(config: MotionAutoencoderConfig, data: Data, sampling: NoSampling = NO
             }
             return config.value_weight * terms["value"] + config.speed_weight * terms["speed"], terms
         poses = jnp.stack([data.pose_statistics.denormalise(rebuilt), batch.pose])
-        ours, theirs = rotations = data.space.rotations(poses)
+        rotations: Any = data.space.rotations(poses)
+        ours, theirs = rotations
         places = data.space.joint_positions(rotations)
         terms = {
             "rotation": losses.rotation_loss(ours, theirs),

@@ -6,6 +6,7 @@ training they are those of the clip itself. In generation they are requested as 
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -53,7 +54,8 @@ def measure(names: Sequence[str], data: Data, pose: Float[Array, "B T R D"]) -> 
     if not names:
         return jnp.zeros((*pose.shape[:2], 0), pose.dtype)
     joints = named_joints(data.space.skeleton.names)
-    places = data.space.joint_positions(data.space.rotations(pose))
+    rotations: Any = data.space.rotations(pose)
+    places = data.space.joint_positions(rotations)
     left, right = joints["L_Wrist"], joints["R_Wrist"]
 
     def clip(places: Float[Array, "T J 3"]) -> Float[Array, "T K"]:
