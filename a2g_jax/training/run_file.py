@@ -54,11 +54,12 @@ def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any]
     Args:
         values: the contents of ``run.json``.
     """
-    settings, sampling = dict(values["model_config"]), values.get("sampling")
+    settings: dict[str, Any] = dict(values["model_config"])
+    sampling = values.get("sampling")
     if sampling is not None:
         return settings, dict(sampling)
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
-    moved = {str(name): _MOVED.get(name, name) for name in settings}
+    moved: dict[str, str] = {name: _MOVED.get(name, name) for name in settings}
     return (
         {name: value for name, value in settings.items() if moved[name] not in own},
         {moved[name]: value for name, value in settings.items() if moved[name] in own},
