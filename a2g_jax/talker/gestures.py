@@ -7,7 +7,7 @@ from a2g_jax.talker.arms import plan_arms
 from a2g_jax.talker.fingers import finger_rotations, plan_fingers
 from a2g_jax.talker.gesture_plan import draw_gestures
 from a2g_jax.talker.paths import draw_waves
-from a2g_jax.talker.pose import pose_body
+from a2g_jax.talker.pose import joint_rotations
 from a2g_jax.talker.posture import plan_posture
 from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
 from a2g_jax.talker.speech import SpeechPlan
@@ -59,7 +59,8 @@ def gesticulate(
         values[:, :7] += values[:, 8:] * idle[hand].sample(times)
         controls[hand] = values
     channels, breath = posture.sample(times)
-    rotations, root = pose_body(channels, breath, controls, posture.stance, -1.0 if style.right_handed >= 0.5 else 1.0)
+    over = -1.0 if style.right_handed >= 0.5 else 1.0
+    rotations, root = joint_rotations(channels, breath, controls, posture.stance, over)
     truth = GestureTruth(
         strokes=draws.strokes,
         phases=phases,
