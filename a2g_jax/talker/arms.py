@@ -1,4 +1,4 @@
-"""From drawn strokes to the control track of each arm: preparation, stroke, hold, retraction, rest."""
+"""Control tracks of both arms from the drawn strokes, with small beats and the movements of resting hands."""
 
 from collections.abc import Sequence
 
@@ -14,9 +14,9 @@ from a2g_jax.talker.styles import GestureStyle
 from a2g_jax.talker.truth import GestureUnit, PhaseSpan, Stroke
 
 SMALL_BEAT = 0.12
-"""Accents from here on (0 to 1) are felt as small beats where they get no stroke."""
+"""Smallest accent (0 to 1) that gets a small beat where it gets no stroke."""
 _MIRROR_LAG = 0.06
-"""The second hand follows by up to this much, seconds."""
+"""Largest lag of the second hand, seconds."""
 
 
 def plan_arms(
@@ -39,7 +39,7 @@ def plan_arms(
             arm = arms[hand]
             follow = _next_stroke(draws, number, hand)
             if hand not in hands:
-                _sympathise(arm, strokes, style, rng)
+                _move_idle_hand(arm, strokes, style, rng)
             elif hand == lead:
                 perform_unit(arm, plan, strokes, timings, shapes, follow, unit.holds, style, rng)
             else:
@@ -58,7 +58,7 @@ def plan_arms(
 def _unit_shapes(
     strokes: Sequence[Stroke], unit: GestureUnit, style: GestureStyle, rng: np.random.Generator
 ) -> list[tuple[Control, Control, Control]]:
-    """The strokes of a unit; its place drifts from one to the next."""
+    """Start, arrival and bow of each stroke of a unit, whose place drifts from stroke to stroke."""
     shapes: list[tuple[Control, Control, Control]] = []
     drift, before = np.zeros(3), None
     for order, stroke in enumerate(strokes):
@@ -84,7 +84,7 @@ def _unit_shapes(
 def _small_beats(
     arm: Arm, plan: SpeechPlan, draws: GestureDraws, style: GestureStyle, rng: np.random.Generator
 ) -> None:
-    """Accents too weak for a stroke are felt as small beats of a hand that is up; more in held gestures."""
+    """Add small beats of a raised hand at accents too weak for a stroke; held units have more of them."""
     taken = {stroke.syllable for stroke in draws.strokes}
     for unit in draws.units:
         if unit.hand not in (arm.hand, "both"):
@@ -104,7 +104,7 @@ def _small_beats(
 
 
 def _fidget(arm: Arm, style: GestureStyle, rng: np.random.Generator) -> None:
-    """Resting hands shift now and then."""
+    """Add the occasional shifts of a resting hand."""
     for span in [span for span in arm.spans if span.phase == "rest"]:
         now = span.start + rng.uniform(0.2, 1.2)
         while now < span.end - 0.8:
@@ -140,8 +140,8 @@ def _second_hand(
     return shift + share * (ready - middle), shift + share * (apex - middle), share * bow
 
 
-def _sympathise(arm: Arm, strokes: list[Stroke], style: GestureStyle, rng: np.random.Generator) -> None:
-    """The idle hand stirs a little with the other hand's strokes."""
+def _move_idle_hand(arm: Arm, strokes: list[Stroke], style: GestureStyle, rng: np.random.Generator) -> None:
+    """Add small movements of the idle hand along with the other hand's strokes."""
     for stroke in strokes:
         height = np.zeros(len(arm.rest))
         size = style.radius * stroke.size * rng.uniform(0.10, 0.40)

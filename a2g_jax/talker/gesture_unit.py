@@ -29,7 +29,7 @@ class StrokeTiming:
 
 @dataclass
 class Arm:
-    """One arm being planned: where it is led to, and since when it has been free."""
+    """One arm while it is planned: its control track, its phases, and when its last movement ends (``free``)."""
 
     hand: str
     rest: Control
@@ -42,7 +42,7 @@ class Arm:
             self.spans.append(PhaseSpan(begin, end, phase, self.hand))
 
     def interrupt(self, time: float) -> None:
-        """A new movement sets in at ``time``, maybe before the last retraction has faded out."""
+        """Begin a movement at ``time``, which may be before the last retraction ends; phases are shortened to fit."""
         while self.spans and self.spans[-1].end > time:
             last = self.spans.pop()
             if last.phase == "stroke":
@@ -73,12 +73,12 @@ def perform_unit(
     style: GestureStyle,
     rng: np.random.Generator,
 ) -> None:
-    """One gesture unit of one arm."""
+    """Add one gesture unit to one arm."""
     tempo = style.speed
     for order, (timing, (ready, apex, bow)) in enumerate(zip(timings, shapes, strict=True)):
         if order == 0:
-            want = rng.uniform(0.50, 0.72) / tempo
-            begin = max(timing.begin - want, min(arm.free - 0.15, timing.begin - 0.22))
+            length = rng.uniform(0.50, 0.72) / tempo
+            begin = max(timing.begin - length, min(arm.free - 0.15, timing.begin - 0.22))
             arm.mark("rest", arm.free, begin)
             arm.interrupt(begin)
             arm.mark("preparation", arm.free, timing.begin)
@@ -101,7 +101,7 @@ def _between(
     style: GestureStyle,
     rng: np.random.Generator,
 ) -> float:
-    """What the hand does between two strokes of a unit; returns when the next preparation begins."""
+    """Add hold, relaxing and preparation between two strokes of a unit; returns when the preparation begins."""
     gap = timing.begin - before.end
     prepare = min(rng.uniform(0.32, 0.5) / style.speed, max(gap + 0.08, 0.2))
     begin = timing.begin - prepare
@@ -111,16 +111,16 @@ def _between(
         arm.mark("hold", before.end, middle)
         arm.mark("preparation", middle, timing.begin)
         return begin
-    # The hand sinks back and closes a little, as if the effort had left it.
+    # The hand sinks back and closes a little, as it relaxes.
     relax = arm.track.goal.copy()
     ease = (1.0 - 0.6 * min(style.tension, 1.0)) * rng.uniform(0.22, 0.5)
     relax[:6] += ease * (arm.rest - arm.track.goal)[:6]
     end = release + rng.uniform(0.40, 0.60) / style.speed
     arm.track.step_to(relax, release, end)
-    let_go, middle = max(release, before.end), max(min(end, begin), before.end)
-    arm.mark("hold", before.end, let_go)
-    arm.mark("retraction", let_go, middle)
-    arm.mark("preparation", max(middle, let_go), timing.begin)
+    released, middle = max(release, before.end), max(min(end, begin), before.end)
+    arm.mark("hold", before.end, released)
+    arm.mark("retraction", released, middle)
+    arm.mark("preparation", max(middle, released), timing.begin)
     return begin
 
 
@@ -133,7 +133,7 @@ def _retract(
     style: GestureStyle,
     rng: np.random.Generator,
 ) -> None:
-    """Hold, then lead the arm back to rest; part of the way where the next unit follows soon."""
+    """Add a hold and the way back to rest, only part of it where the next unit follows soon."""
     length = rng.uniform(0.60, 0.95) / style.speed
     begin = timing.end + stroke.hold - 0.04
     pause = _next_pause(plan, stroke.apex)
@@ -141,7 +141,7 @@ def _retract(
         begin = max(min(begin, pause + 0.1), timing.end - 0.04)
     share = 1.0
     if follow is not None:
-        # The next stroke's preparation wants about 0.7 s.
+        # The next stroke's preparation takes about 0.7 s.
         room = follow.apex - 0.75 - begin
         if room < length:
             begin = max(min(begin, follow.apex - 1.0), timing.end - 0.04)
@@ -158,7 +158,7 @@ def _retract(
 
 
 def _next_pause(plan: SpeechPlan, after: float) -> float | None:
-    """Start of the long pause that follows the phrase spoken at ``after``, if one does."""
+    """Start of the long pause after the phrase that is spoken at ``after``; None without one."""
     for index, phrase in enumerate(plan.phrases):
         if phrase.end >= after:
             last = index + 1 == len(plan.phrases)

@@ -55,7 +55,7 @@ def test_flags(tmp_path, short, capsys):
         (["talker", "--speakers", "ada,zoe"], "--speakers: there is no zoe; there are: ada, bruno,"),
         (["talker", "--emotions", "joy"], "--emotions: there is no joy; there are: neutral,"),
         (["talker", "--speakers", ","], "--speakers: names nobody"),
-        (["talker", "--speakers", "ada,ada"], "a name comes twice in ada,ada"),
+        (["talker", "--speakers", "ada,ada"], "a name is repeated in ada,ada"),
         (["talker", "--jitter", "90"], "--jitter: expected degrees from 0 to 45; got 90"),
         (["talker", "--jitter", "much"], "expected a number above 0; got 'much'"),
         (["talker", "--workers", "0"], "from 1 to 1000; got '0'"),
