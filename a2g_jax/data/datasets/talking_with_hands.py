@@ -2,7 +2,7 @@
 
 Layout: the README of the 2023 data (github.com/genea-workshop/genea_challenge_2023, ``dataset``), and for 2022
 ``process_data.py`` of the IVI Lab's entry. Words are those of the TSV files, where an entry may be several words; a
-file without any means that the speaker says nothing. The root joint is ``body_world``, which holds the path of the
+file without any is that of a silent speaker. The root joint is ``body_world``, which holds the path of the
 body (the challenges' visualizer copies the position of no other joint); every other joint has a position too, which
 :func:`~a2g_jax.io.bvh.read_bvh` takes for its bone.
 """
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
     @property
     def place(self) -> str:
-        """For messages."""
+        """File and line, for messages."""
         return f"{self.path}, line {self.line}"
 
 
@@ -98,7 +98,7 @@ def _read_metadata(files: Sequence[Path], name: re.Pattern[str], columns: Sequen
                 raise InputError(f"{row.place}: expected {', '.join(columns)}; got {', '.join(cells)[:80]!r}.")
             other = result.setdefault(cells[0], row)
             if other is not row:
-                raise InputError(f"{row.place}: {cells[0]} stands in {other.place} already; remove one.")
+                raise InputError(f"{row.place}: {cells[0]} is in {other.place} already; remove one.")
     return result
 
 
@@ -113,17 +113,18 @@ def _check_rows(named: dict[str, Path], rows: dict[str, Row], folder: Path) -> N
     """Each recording has a row, and each row a recording.
 
     Args:
-        named: a file of each recording, by the name that the metadata has for it.
+        named: a file of each recording, by its name in the metadata.
 
     Raises:
-        InputError: names the file without a row, or the row without a file.
+        InputError: a file without a row, or a row without a file.
     """
     if not rows:
         raise InputError(f"{folder}: holds no metadata table, such as metadata.csv, which names the speakers; add it.")
-    if lonely := sorted(set(named) - set(rows)):
-        raise InputError(f"{named[lonely[0]]}: has no row in {next(iter(rows.values())).path.name}; add or remove it.")
-    if lonely := sorted(set(rows) - set(named)):
-        raise InputError(f"{rows[lonely[0]].place}: there is no file of {lonely[0]}; add it or remove the row.")
+    if unmatched := sorted(set(named) - set(rows)):
+        table = next(iter(rows.values())).path.name
+        raise InputError(f"{named[unmatched[0]]}: has no row in {table}; add or remove it.")
+    if unmatched := sorted(set(rows) - set(named)):
+        raise InputError(f"{rows[unmatched[0]].place}: there is no file of {unmatched[0]}; add it or remove the row.")
 
 
 def make_take(release: Release, name: str, speaker: str, annotations: dict[str, object]) -> Take:

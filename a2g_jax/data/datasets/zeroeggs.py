@@ -38,7 +38,7 @@ class _Info:
 def find(folder: Path) -> list[Take]:
     """All takes of ``clean`` under the folder, or else all of ``original``, in the order of their names.
 
-    ``clean`` holds the same takes, cut and without the experimenter's voice; name ``original`` itself to read that.
+    ``clean`` holds the same takes, cut and without the experimenter's voice; for the others, name ``original`` itself.
     """
     files = list_files(folder, _EXPECTED)
     clean = files_by_name(files, lambda stem: stem if _CLEAN.fullmatch(stem) else None, (".bvh", ".wav"))
@@ -65,7 +65,7 @@ def _read_info(folder: Path, files: Sequence[Path], columns: Sequence[str]) -> d
         for line, cells in read_columns(path, columns):
             row = _Info(path, line, cells)
             if row.name in result:
-                raise InputError(f"{row.place}: {row.name} stands in {result[row.name].place} already; remove one.")
+                raise InputError(f"{row.place}: {row.name} is in {result[row.name].place} already; remove one.")
             result[row.name] = row
     return result
 
@@ -94,9 +94,9 @@ def _clean_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
 
 
 def _original_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
-    known = set(info) | {row.audio for row in info.values()}
-    if lonely := sorted(set(groups) - known):
-        raise InputError(f"{min(groups[lonely[0]].values())}: has no row in info.csv; add or remove it.")
+    listed = set(info) | {row.audio for row in info.values()}
+    if unlisted := sorted(set(groups) - listed):
+        raise InputError(f"{min(groups[unlisted[0]].values())}: has no row in info.csv; add or remove it.")
     takes = []
     for name, row in sorted(info.items()):
         motion, speech = groups.get(name, {}), groups.get(row.audio, {})
@@ -115,7 +115,7 @@ def _original_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
 
 
 def read(take: Take, sample_rate: int) -> Recording:
-    """A take. Annotations: ``style``, ``mirrored``, ``session`` of capture, and ``stretch`` of one played faster."""
+    """A take. Annotations: ``style``, ``mirrored``, ``session`` of capture, and ``stretch`` of takes played faster."""
     wav, bvh, *speech = (Path(source) for source in take.sources)
     audio, motion = read_audio(wav, sample_rate), read_bvh(bvh)
     if "times" in take.spec:
@@ -142,6 +142,6 @@ DATASET = DataSet(
     about=(
         "github.com/ubisoft/ubisoft-laforge-ZeroEGGS, CC BY-NC-ND 4.0; one speaker. Name the folder data: clean is "
         "read if it is there, else original, cut to the acting. The column validation of info.csv is the official "
-        "split (training and validation). Mirrored takes are told by the annotation mirrored."
+        "split (training and validation). Mirrored takes have the annotation mirrored."
     ),
 )

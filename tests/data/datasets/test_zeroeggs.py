@@ -144,7 +144,7 @@ def test_timecodes():
         (",FALSE", "", r"info\.csv, line 2: expected 16 cells, as the header has; got 15"),
         ("005_Sad_4.bvh", "009_Sad_4.bvh", r"005_Sad_4\.(bvh|wav): has no row|line 4: there is no file 009_Sad_4\.bvh"),
         ("005_Sad_4.wav", "009_Sad_4.wav", r"there is no file 009_Sad_4\.wav; add it or remove the row"),
-        ("005_Sad_4.bvh", "001_Neutral_0.bvh", "line 4: 001_Neutral_0 stands in .*line 2 already"),
+        ("005_Sad_4.bvh", "001_Neutral_0.bvh", "line 4: 001_Neutral_0 is in .*line 2 already"),
     ],
 )
 def test_damaged_tables(tmp_path, old, new, message):
@@ -186,7 +186,7 @@ def test_wrong_folders(tmp_path, files):
 def test_acting_after_the_end(tmp_path):
     write_original(tmp_path, seconds=0.25)
     with pytest.raises(
-        InputError, match=r"001_Neutral_0\.bvh: lasts 0\.25 s, and by info\.csv the acting starts at 0\.50"
+        InputError, match=r"001_Neutral_0\.bvh: lasts 0\.25 s, and the acting starts at 0\.50 s; correct info\.csv"
     ):
         zeroeggs.read(zeroeggs.find(tmp_path)[0], 16000)
 
