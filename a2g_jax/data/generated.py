@@ -23,7 +23,7 @@ _JITTER = 1000
 
 @dataclass(frozen=True)
 class TalkerOptions:
-    """How generated recordings are made; the same for all of a corpus."""
+    """Settings of a generated corpus."""
 
     minutes: float = 30.0
     seed: int = 0

@@ -60,7 +60,7 @@ def find_features(name: str) -> Features:
     """The features of a paper.
 
     Raises:
-        InputError: there are none of that name.
+        InputError: unknown name.
     """
     if name not in PRESETS:
         raise InputError(f"--features: there is no {name!r}; there are: {', '.join(PRESETS)}.")

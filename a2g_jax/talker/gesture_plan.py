@@ -1,4 +1,4 @@
-"""Which syllables get strokes (the plan determines it), and the hidden choices that are drawn for them."""
+"""Selection of the syllables with strokes, which the plan determines, and the hidden choices drawn for them."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where the hands go in each gesture family and rest pose.
+"""Hand positions and wrist angles of each gesture family and rest pose.
 
 An arm's control has nine channels: the wrist's place ``out`` (away from the midline, to its own side), ``up`` and
 ``fwd`` from the chest joint (metres, upright axes that turn with the chest), ``supination``, ``palmar`` flexion and

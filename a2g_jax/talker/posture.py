@@ -21,7 +21,7 @@ NOD_SPACING = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """Where the feet stand for the whole recording."""
+    """Positions of the feet, fixed for a recording."""
 
     lateral: float
     """Ankles' distance from the midline, metres."""

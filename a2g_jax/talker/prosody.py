@@ -141,7 +141,7 @@ def pitch_contour(
 def creak_contour(
     plan: SpeechPlan, times: Float[np.ndarray, " T"], rng: np.random.Generator
 ) -> Float[np.ndarray, " T"]:
-    """How creaky the voice is, 0 to 1: half of the falling phrases end in creak (irregular pulses at half the rate)."""
+    """Creakiness of the voice, 0 to 1: half of the falling phrases end in creak (irregular pulses at half the rate)."""
     curve = np.zeros(len(times))
     for phrase in plan.phrases:
         length = rng.uniform(0.08, 0.22)

@@ -42,7 +42,7 @@ def wrist_targets(
 def clear_hands(
     hands: dict[str, tuple[Vectors, Rotations]], pelvis: Vectors, neck: Vectors, facing: Rotations, over: float
 ) -> dict[str, Vectors]:
-    """How far both wrists have to move for palms and fingers to clear the torso and each other.
+    """Displacements of both wrists that keep palms and fingers clear of the torso and of each other.
 
     Args:
         hands: wrist position and the hand's axes in the world, by hand.

@@ -80,7 +80,7 @@ def test_refusals(tmp_path, monkeypatch, capsys, arguments, message):
 
 
 def test_rotations_as_exponential_maps(tmp_path, short):
-    """What the flow's settings ask for; the same motion as in 6D."""
+    """The flow's settings; the same motion as in 6D."""
     options = TalkerOptions(minutes=0.2, seed=3, fps=20.0)
     maps = prepare_talker(tmp_path / "maps", options, find_features("stylized-flow"), workers=1)
     six = prepare_talker(tmp_path / "six", options, workers=1)

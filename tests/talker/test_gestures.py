@@ -1,4 +1,4 @@
-"""The generated corpus's gestures: what the audio decides, what is drawn, and whether the body moves like one."""
+"""The generated corpus's gestures: what the audio determines, what is drawn, and whether the motion is human."""
 
 import math
 from itertools import pairwise
@@ -296,7 +296,7 @@ def test_plan_without_accents_keeps_the_hands_at_rest():
     assert speed.max() < 0.5
 
 
-# --- the body ---------------------------------------------------------------------------------------------------
+# --- the motion ---------------------------------------------------------------------------------------------------
 
 
 def test_rotations_are_rotations():
@@ -366,7 +366,7 @@ def test_jerk_is_bounded():
     for seed in range(3):
         _, motion, _ = draw(seed=seed, fps=120.0, speaker="felix", emotion="anger")
         _, places = fk(motion)
-        # 1e-7 m of float32 rounding is 0.2 m/s^3 at 120 fps: far below what is asked.
+        # 1e-7 m of float32 rounding is 0.2 m/s^3 at 120 fps: far below the limit.
         jerk = np.linalg.norm(np.diff(places, n=3, axis=0), axis=2) * 120.0**3
         # Fast hands that pass each other move apart quickly; strokes alone stay below 6000.
         assert jerk.max() < 20000.0

@@ -71,14 +71,14 @@ def _read_info(folder: Path, files: Sequence[Path], columns: Sequence[str]) -> d
 
 
 def _clean_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
-    takes, there = [], set()
+    takes, found = [], set()
     for name, files in groups.items():
         match = _CLEAN.fullmatch(name)
         take, style, mirror, whole, tenth = match.groups() if match else ("", "", "", "", "")
         row = info.get(take)
         if info and row is None:
             raise InputError(f"{min(files.values())}: has no row in info.csv; add or remove it.")
-        there.add(take)
+        found.add(take)
         annotations: dict[str, object] = {"style": row.cells["style"] if row else style, "mirrored": bool(mirror)}
         if (whole, tenth) != ("1", "0"):
             annotations["stretch"] = float(f"{whole}.{tenth}")
@@ -86,9 +86,9 @@ def _clean_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
             annotations["session"] = row.cells["capture_session"]
         sources = (str(require(files, ".wav", "WAV file")), str(require(files, ".bvh", "BVH file")))
         takes.append(Take(name, sources, row.split if row else "", {"annotations": annotations}))
-    mirrors = any(name.endswith("_mirror") for name in there)
+    mirrors = any(name.endswith("_mirror") for name in found)
     for row in info.values():
-        if row.name not in there and (mirrors or not row.name.endswith("_mirror")):
+        if row.name not in found and (mirrors or not row.name.endswith("_mirror")):
             raise InputError(f"{row.place}: there is no file of {row.name}; add it or remove the row.")
     return takes
 
@@ -100,8 +100,8 @@ def _original_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
     takes = []
     for name, row in sorted(info.items()):
         motion, speech = groups.get(name, {}), groups.get(row.audio, {})
-        for file, there, suffix in ((name, motion, ".bvh"), (row.audio, speech, ".wav")):
-            if suffix not in there:
+        for file, files, suffix in ((name, motion, ".bvh"), (row.audio, speech, ".wav")):
+            if suffix not in files:
                 raise InputError(f"{row.place}: there is no file {file}{suffix}; add it or remove the row.")
         sources = [str(speech[".wav"]), str(motion[".bvh"])] + ([str(speech[".csv"])] if ".csv" in speech else [])
         annotations = {

@@ -108,9 +108,9 @@ def test_the_experimenter_is_silenced(tmp_path):
     _, sounds = write_original(tmp_path)
     put(tmp_path / "original" / "005_Sad_4.csv", "#,Name,Start,End\nM1,x,0:00.000,0:03.000\nR1,x,0:01.500,0:01.750\n")
     recording = zeroeggs.read(zeroeggs.find(tmp_path)[2], 48000)
-    heard = np.zeros(72000, np.float32)
-    heard[24000:36000] = sounds["005_Sad_4"][72000:84000]
-    check_sound(recording.audio, heard)
+    acted = np.zeros(72000, np.float32)
+    acted[24000:36000] = sounds["005_Sad_4"][72000:84000]
+    check_sound(recording.audio, acted)
 
 
 def test_clean_is_taken_where_both_are(tmp_path):
@@ -203,6 +203,6 @@ def test_real_take(shared, tmp_path):
     recording = zeroeggs.read(take, 16000)
     assert recording.annotations == {"style": "Speech", "mirrored": False, "session": "2"}
     assert recording.motion.skeleton.names == tree(TREES["zeroeggs"])[0]
-    # The cut that info.csv tells is as long as the clean take: 68 s and 50 sixtieths.
+    # The cut by info.csv is as long as the clean take: 68 s and 50 sixtieths.
     assert recording.motion.seconds == pytest.approx(68 + 50 / 60, abs=0.04)
     assert len(recording.audio) / 16000 == pytest.approx(68 + 50 / 60, abs=0.04)
