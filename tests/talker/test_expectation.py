@@ -138,7 +138,7 @@ def test_entropy_is_minus_the_expected_log_probability(drawn):
 def test_agreement_is_what_pairs_of_draws_show(drawn):
     recording, _, draws = drawn
     first, second = draws[::2], draws[1::2]
-    drawn = {
+    agreements = {
         "rest_pose": [[a.rest_pose == b.rest_pose] for a, b in zip(first, second, strict=True)],
         "posture": [[a.posture == b.posture] for a, b in zip(first, second, strict=True)],
         "stroke_family": [
@@ -147,13 +147,13 @@ def test_agreement_is_what_pairs_of_draws_show(drawn):
         ],
     }
     for name, field in (("hand", "hand"), ("place", "place"), ("hold", "holds"), ("family", "family")):
-        drawn[name] = [
+        agreements[name] = [
             [getattr(u, field) == getattr(v, field) for u, v in zip(a.units, b.units, strict=True)]
             for a, b in zip(first, second, strict=True)
         ]
     choices = hidden_choices(recording)
-    assert set(choices) == set(drawn)
-    for name, alike in drawn.items():
+    assert set(choices) == set(agreements)
+    for name, alike in agreements.items():
         assert len(alike[0]) == choices[name].times, name
         estimate = sample_mean(np.mean(alike, axis=1))
         assert estimate.mean == pytest.approx(choices[name].agreement, abs=4 * estimate.standard_error), name
