@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, seed
 from a2g_jax.cli.paths import existing_file, existing_folder
+from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
 
 if TYPE_CHECKING:
@@ -15,27 +16,31 @@ if TYPE_CHECKING:
     from a2g_jax.data.settings import Features
 
 DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: the same command resumes."
-#: The generated corpus and the names of :data:`a2g_jax.data.datasets.NAMES`, whose readers import NumPy.
-READERS = (
-    *("talker", "folder", "trinity", "genea2022", "genea2023", "beat", "beat2", "zeroeggs"),
-    *("ted", "ted-expressive", "s2g", "pats", "show"),
-)
+#: The generated corpus, and the data sets of this package.
+READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
 _GENERATED = ("minutes", "speakers", "emotions", "jitter", "fingers", "view", "on_demand")
 _RECORDED = ("source", "joints", "random_split", "skip_broken", "limit")
 
 
 def _reader(text: str) -> str:
-    """A name of :data:`READERS`, or the path of a Python file."""
-    if text not in READERS and not text.endswith(".py"):
-        raise argparse.ArgumentTypeError(f"expected one of {', '.join(READERS)}, or a reader.py; got {text!r}")
+    """A name of a data set, the path of a Python file, or ``module:name``."""
+    known = ("talker", *all_names())
+    if text not in known and not is_reference(text):
+        raise argparse.ArgumentTypeError(
+            f"expected one of {', '.join(known)}, a reader.py or package.module:READER; got {text!r}"
+        )
     return text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g prepare``."""
     parser.add_argument(
-        "reader", nargs="?", type=_reader, metavar="NAME", help="talker, a data set (see --list), or a reader.py"
+        "reader",
+        nargs="?",
+        type=_reader,
+        metavar="NAME",
+        help="talker, a data set (see --list), a reader.py, or package.module:READER",
     )
     parser.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
     parser.add_argument("--list", action="store_true", help="list what can be prepared, and exit")
@@ -158,7 +163,7 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
     if options.source is None:
         raise InputError(f"name the folder: a2g prepare {options.reader} SOURCE --out CORPUS.")
     _refuse(options, _GENERATED, "'a2g prepare talker'; recordings are prepared as they are.")
-    if options.reader not in READERS:
+    if options.reader.endswith(".py"):
         existing_file(options.reader, "name a Python file that defines DATASET")
     existing_folder(options.source)
 
@@ -205,14 +210,13 @@ def _names(flag: str, text: str | None) -> tuple[str, ...]:
 
 
 def _list_data_sets() -> None:
-    from a2g_jax.data.datasets import NAMES, find_data_set
+    from a2g_jax.data.datasets import data_set_lines
     from a2g_jax.data.settings import PRESETS
 
-    for name in NAMES:
-        reader = find_data_set(name)
-        print(f"{name}: {reader.title}, {reader.fps:g} fps")
-        if reader.about:
-            print(textwrap.indent(textwrap.fill(reader.about, 96), "    "))
+    for line, about in data_set_lines():
+        print(line)
+        if about:
+            print(textwrap.indent(textwrap.fill(about, 96), "    "))
     print("talker: generated recordings with ground truth (see 'a2g talk')")
     print("\nfeatures of the papers (--features):")
     for name, features in PRESETS.items():

@@ -1,4 +1,4 @@
-"""From recordings to a corpus: rows, statistics, splits, a manifest; stopped at any moment, it can be gone on with."""
+"""Writing a corpus: rows, statistics, splits, manifest. Interruptible and resumable."""
 
 import hashlib
 import json
@@ -36,17 +36,17 @@ from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.features.statistics import RunningStatistics
 from a2g_jax.io.files import make_folder, read_json, sha256_file, write_json
 
-#: Standard deviations are raised to these before anything is divided by them.
+#: Lower bounds on standard deviations, which are used as divisors.
 _FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
-#: Rows read at once when statistics are taken.
+#: Rows read at once for the statistics.
 _ROWS = 65536
-#: Of the layout of unfinished work; work of another one is started over.
+#: Version of the layout of unfinished work; work of another one is discarded.
 _LAYOUT = 2
 _RECIPE = "recipe.json"
 
 
 class Item(NamedTuple):
-    """A recording that a corpus shall have."""
+    """A recording of a corpus to be written."""
 
     name: str
     sources: tuple[str, ...]
@@ -55,19 +55,19 @@ class Item(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """What a corpus is to be."""
+    """Settings of a corpus to be written."""
 
     features: Features
     recipe: dict[str, Any]
-    """How the recordings are made; kept in the manifest."""
+    """How the recordings are made; part of the manifest."""
     seed: int = 0
     """Of the split."""
     parts: dict[str, Any] = field(default_factory=dict)
-    """Training recordings to be generated during training, as :mod:`a2g_jax.data.on_demand` knows them; or nothing."""
+    """Training recordings to be generated during training, see :mod:`a2g_jax.data.on_demand`; or empty."""
     official: bool = True
-    """Whether recordings go into the parts that a data set's authors chose, where they did."""
+    """Whether to use the data set's official split where it has one."""
     skip_broken: bool = False
-    """Whether a recording that cannot be prepared is noted and left out instead of ending the work."""
+    """Whether a recording that cannot be prepared is noted and left out instead of raising its error."""
 
 
 def prepare_corpus(
@@ -77,42 +77,42 @@ def prepare_corpus(
     plan: Plan,
     report: Callable[[str], None] = lambda line: None,
 ) -> Corpus:
-    """Make a corpus; stopped at any moment, the same call goes on and ends with the same bytes.
+    """Write a corpus. Interruptible: the same call resumes the work, and the result has the same bytes.
 
-    The folder appears under its name only when it is complete. Until then the work lies beside it, in a hidden folder
+    The folder gets its name only when it is complete. Until then the work is in a hidden folder beside it,
     ``.NAME.unfinished``. Memory holds a few recordings.
 
     Args:
         items: every recording, in order.
-        make: called with how many recordings are done already; gives the others in order.
+        make: called with the number of finished recordings; yields the others in order.
         report: called with a line for the user about anything noteworthy.
 
     Raises:
-        InputError: the folder exists, another process prepares it, there is nothing to prepare, or recordings have
-            different joints.
+        InputError: the folder exists, another process prepares it, there are no recordings, or they have different
+            joints.
         Interrupted: by Ctrl-C.
     """
     path = Path(path)
     with _place(path) as folder:
-        _start_over_unless_same(folder, path, plan, report)
+        _discard_unless_same(folder, path, plan, report)
         work = Unfinished(folder, plan.features)
         total = len(items)
         try:
             done, before = work.recover(list(items))
             if before:
-                again = f" ({before - done} of those done have changed or are damaged)" if done < before else ""
-                report(f"{path}: going on after {done} of {total} recordings{again}")
+                again = f" ({before - done} finished ones have changed or are damaged)" if done < before else ""
+                report(f"{path}: resuming after {done} of {total} recordings{again}")
             with closing(make(done)) as rows:
                 for item in rows:
-                    _take_in(work, item, plan.skip_broken, report)
+                    _add(work, item, plan.skip_broken, report)
             _finish(work, path, plan, report)
         except KeyboardInterrupt:
             raise Interrupted(
-                f"{path}: stopped after {work.done} of {total} recordings; the same command goes on from there."
+                f"{path}: stopped after {work.done} of {total} recordings; run the same command to resume."
             ) from None
         except Exception:
             if work.done:
-                report(f"{path}: {work.done} of {total} recordings are done; the same command goes on from there")
+                report(f"{path}: {work.done} of {total} recordings are finished; run the same command to resume")
             raise
         finally:
             work.close()
@@ -121,7 +121,7 @@ def prepare_corpus(
     return Corpus.open(path)
 
 
-def _take_in(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
+def _add(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
     """Add a recording, or note why it cannot be added."""
     if isinstance(item, Prepared):
         try:
@@ -144,15 +144,15 @@ def write_corpus(
     seed: int = 0,
     report: Callable[[str], None] = lambda line: None,
 ) -> Corpus:
-    """Write recordings to a corpus folder, one at a time and all in one go: an error leaves nothing behind.
+    """Write recordings to a corpus folder, one at a time and not resumable: an error leaves nothing behind.
 
     Args:
-        recipe: how the recordings were made; kept in the manifest.
+        recipe: how the recordings were made; part of the manifest.
         seed: of the split.
         report: called with a line for the user about anything noteworthy.
 
     Raises:
-        InputError: the folder exists, nothing was prepared, or recordings have different joints.
+        InputError: the folder exists, there are no recordings, or they have different joints.
     """
     path = Path(path)
     with _place(path) as folder:
@@ -170,14 +170,14 @@ def write_corpus(
 
 
 def _refuse_existing(path: Path) -> None:
-    """A corpus is never written over: raise ``InputError`` if something has its name."""
+    """Raise ``InputError`` if something has the corpus's name: nothing is overwritten."""
     if os.path.lexists(path):
         raise InputError(f"{path}: exists already; choose another folder or remove it.")
 
 
 @contextmanager
 def _place(path: Path) -> Iterator[Path]:
-    """The folder for unfinished work on a corpus, for this process alone."""
+    """The folder for unfinished work on a corpus, locked against other processes."""
     folder = path.parent / f".{path.name}.unfinished"
     if not folder.exists():
         _refuse_existing(path)
@@ -185,7 +185,7 @@ def _place(path: Path) -> Iterator[Path]:
     try:
         with hold(path.parent / f".{path.name}.lock"):
             if os.path.lexists(path):
-                # The process that finished it was killed before all that it had worked with was gone.
+                # The process that finished it was killed before it had removed the unfinished work.
                 shutil.rmtree(folder, ignore_errors=True)
             _refuse_existing(path)
             yield folder
@@ -193,8 +193,8 @@ def _place(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: another process is preparing it; wait for it or choose another folder.") from None
 
 
-def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
-    """Remove unfinished work of another recipe, and write down this one."""
+def _discard_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
+    """Remove unfinished work of another recipe, and record this one."""
     about = {**plan.features.to_json(), "package": __version__, "layout": _LAYOUT}
     rest = {"parts": plan.parts, "official splits": plan.official, "skip broken": plan.skip_broken}
     now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
@@ -202,7 +202,7 @@ def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callab
         try:
             before = read_json(folder / _RECIPE)
         except InputError:
-            before = None  # killed before a word was written, or damaged
+            before = None  # killed before it was written, or damaged
         if before == now:
             return
         if isinstance(before, dict):
@@ -211,28 +211,28 @@ def _start_over_unless_same(folder: Path, path: Path, plan: Plan, report: Callab
                 for key, value in now.items()
                 if before.get(key) != value and not isinstance(value, list | dict)
             ]
-            report(f"{path}: unfinished work with other settings ({'; '.join(changed)}) was there; starting over")
+            report(f"{path}: unfinished work with other settings ({'; '.join(changed)}) is discarded")
         shutil.rmtree(folder)
     make_folder(folder)
     write_json(folder / _RECIPE, now)
 
 
 def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
-    """Everything but the rows; then the corpus gets its name."""
+    """Write everything but the rows; then give the corpus its name."""
     entries, body, folder, features = work.entries, work.body, work.corpus, plan.features
     if body is None:
-        reason = f" the first of {work.done}: {work.skipped[0].reason}" if work.skipped else ""
+        reason = f" The first of {work.done}: {work.skipped[0].reason}" if work.skipped else ""
         raise InputError(f"no recordings to prepare; check the source.{reason}")
     if work.spread > 0.001:
         report(
             f"bone lengths differ between recordings by up to {work.spread * 100:.1f} cm;"
-            f" rotations are kept, positions use those of {entries[0].name}"
+            f" rotations are kept, positions use the bones of {entries[0].name}"
         )
     work.finish_arrays()
     parts = [entry.split if plan.official else "" for entry in entries]
     splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
     if not splits["train"]:
-        raise InputError(f"{path}: no recording is left for training; add some, or split by the seed (--random-split).")
+        raise InputError(f"{path}: no recordings for training; add some, or split by the seed (--random-split).")
     _write_statistics(folder, entries, splits)
     files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
     if plan.parts:

@@ -26,13 +26,13 @@ class Prepared:
     pose: Float[np.ndarray, "T R D"]
     root: Float[np.ndarray, "T 3"]
     waveform: Int16[np.ndarray, " N"] | None
-    """As many samples as the frames last, where the corpus keeps them."""
+    """Samples over the duration of the frames, where the corpus has them."""
     body: Skeleton | PoseLayout
-    """What the rows of a pose are."""
+    """Joints, points or bones of the pose rows."""
     speaker: str
     emotion: str
     split: str
-    """Official part of the data set, or empty."""
+    """Part of the official split, or empty."""
     sources: tuple[str, ...]
     annotations: dict[str, Any]
 
@@ -47,26 +47,26 @@ class Skipped:
 
 
 def prepare_recording(recording: Recording | PoseRecording, features: Features, split: str = "") -> Prepared:
-    """Features and motion of one recording, as many frames as both have.
+    """Features and motion of one recording, over the frames that both have.
 
     Args:
-        split: the recording's official part of the data set, if any.
+        split: the recording's part of the official split, if any.
 
     Raises:
         InputError: audio and motion differ in length by more than a second and 5 %, the audio has another rate, the
-            rig is not understood, or the motion does not tell such poses.
+            rig is not recognised, or the motion cannot be written in the representation.
     """
     where = " and ".join(recording.sources) or recording.name
     mel, fps = features.mel, features.fps
     if recording.sample_rate != mel.sample_rate:
         raise InputError(f"{where}: has {recording.sample_rate} Hz audio; expected {mel.sample_rate} Hz.")
-    heard, seen = len(recording.audio) / recording.sample_rate, recording.motion.seconds
-    if abs(heard - seen) > max(1.0, 0.05 * max(heard, seen)):
+    audio_seconds, motion_seconds = len(recording.audio) / recording.sample_rate, recording.motion.seconds
+    if abs(audio_seconds - motion_seconds) > max(1.0, 0.05 * max(audio_seconds, motion_seconds)):
         raise InputError(
-            f"{where}: audio lasts {heard:.2f} s and motion {seen:.2f} s; cut them to the same take, or correct the"
-            " motion's frame time."
+            f"{where}: audio lasts {audio_seconds:.2f} s and motion {motion_seconds:.2f} s; cut them to the same take,"
+            " or correct the motion's frame time."
         )
-    frames = min(round(heard * fps), round(seen * fps))
+    frames = min(round(audio_seconds * fps), round(motion_seconds * fps))
     if frames < 2:
         raise InputError(f"{where}: gives {frames} frames at {fps:g} fps; use longer recordings or a higher --fps.")
     motion: Motion | PoseTrack
@@ -95,24 +95,24 @@ def prepare_recording(recording: Recording | PoseRecording, features: Features, 
 def choose_joints(motion: Motion, joints: str, where: str) -> Motion:
     """The motion on the joints that a corpus keeps.
 
-    A rig is retargeted to the 22 body joints, or to the 47 of the upper body: standing upright with y up and facing z,
-    in metres, its rest pose a T, so that the same numbers mean the same pose whatever the rig was.
+    A rig is retargeted to the 22 body joints, or to the 47 of the upper body: upright with y up and facing z, in
+    metres, with a T-pose at rest, so that equal numbers are equal poses for any rig.
 
     Raises:
-        InputError: the rig is not understood.
+        InputError: the rig is not recognised.
     """
     if joints == "all" or (joints == "body" and motion.skeleton.names == BODY_JOINTS):
         return motion
     try:
         rig = find_rig(motion, name=where)
     except InputError as error:
-        raise InputError(f"{error} With --joints all the rig is taken as it is.") from None
+        raise InputError(f"{error} Or use --joints all, which keeps the rig as it is.") from None
     target = body_skeleton(rig) if joints == "body" else upper_body_skeleton(rig)
     return retarget(motion, target, source=rig)
 
 
 def _waveform(audio: Float[np.ndarray, " N"], samples: int) -> Int16[np.ndarray, " n"]:
-    """16-bit samples, with silence where the audio ends first."""
+    """16-bit samples, padded with silence."""
     whole = np.zeros(samples, np.float32)
     whole[: len(audio)] = audio[:samples]
     return np.rint(np.clip(whole, -1.0, 1.0) * 32767.0).astype(np.int16)

@@ -28,19 +28,19 @@ def find_pairs(folder: str | os.PathLike[str]) -> list[tuple[Path, Path]]:
     motions = [path for path in files if path.suffix.lower() == ".bvh"]
     if not sounds and not motions:
         raise InputError(f"{folder}: holds no WAV and no BVH files; name a folder that does.")
-    # Side by side; else in parallel trees such as wav/s1/a.wav and bvh/s1/a.bvh; else by file name alone.
+    # Side by side; else in parallel trees such as wav/s1/a.wav and bvh/s1/a.bvh; else by file name only.
     for key in (_whole_path, _below_first_folder, _name_alone):
-        heard, seen = _by_key(sounds, folder, key), _by_key(motions, folder, key)
-        if set(heard) & set(seen):
+        audio_files, bvh_files = _by_key(sounds, folder, key), _by_key(motions, folder, key)
+        if set(audio_files) & set(bvh_files):
             break
-    for missing, there, kind in ((seen, heard, "BVH"), (heard, seen, "audio")):
-        lonely = sorted(set(there) - set(missing))
-        if lonely:
-            raise InputError(f"{there[lonely[0]][0]}: has no {kind} file of the same name; add or remove it.")
-    for paths in (*heard.values(), *seen.values()):
+    for others, files_of, kind in ((bvh_files, audio_files, "BVH"), (audio_files, bvh_files, "audio")):
+        unpaired = sorted(set(files_of) - set(others))
+        if unpaired:
+            raise InputError(f"{files_of[unpaired[0]][0]}: has no {kind} file of the same name; add or remove it.")
+    for paths in (*audio_files.values(), *bvh_files.values()):
         if len(paths) > 1:
             raise InputError(f"{paths[0]} and {paths[1]}: have the same name; rename or remove one.")
-    return [(heard[name][0], seen[name][0]) for name in sorted(seen)]
+    return [(audio_files[name][0], bvh_files[name][0]) for name in sorted(bvh_files)]
 
 
 def _whole_path(path: Path) -> str:
@@ -81,6 +81,6 @@ def read_pair(audio: Path, bvh: Path, sample_rate: int, name: str = "") -> Recor
 
 
 def _speaker(name: str) -> str:
-    """BEAT names a speaker in ``2_scott_0_1_1``; other names say nothing reliable."""
+    """The speaker of a name as in BEAT, ``2_scott_0_1_1``; empty for other names."""
     match = re.fullmatch(r"\d+_([a-z]+)_\d+_\d+_\d+", name)
     return match.group(1) if match else ""

@@ -1,4 +1,4 @@
-"""Recordings of the generated corpus as rows: the same arguments always give the same rows, in any process."""
+"""Recordings of the generated corpus as rows; the same arguments give the same rows in any process."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any, TypeAlias
@@ -23,7 +23,7 @@ _JITTER = 1000
 
 @dataclass(frozen=True)
 class TalkerOptions:
-    """How generated recordings are made; the same for all of a corpus."""
+    """Settings of a generated corpus."""
 
     minutes: float = 30.0
     seed: int = 0
@@ -35,9 +35,9 @@ class TalkerOptions:
     jitter: float = 0.0
     """Degrees of capture noise: see :func:`~a2g_jax.talker.views.capture.add_jitter`."""
     fingers: bool = False
-    """The 52 joints with fingers instead of the 22 of the body."""
+    """The 52 joints with fingers instead of the 22 body joints."""
     view: str = "body"
-    """As which data set shows its speakers: see :data:`~a2g_jax.talker.views.catalogue.VIEWS`."""
+    """Data set whose format the recordings have: see :data:`~a2g_jax.talker.views.catalogue.VIEWS`."""
 
     def __post_init__(self) -> None:
         find_view(self.view)
@@ -49,12 +49,12 @@ class TalkerOptions:
             if unknown:
                 raise InputError(f"--{flag}: there is no {', '.join(unknown)}; there are: {', '.join(known)}.")
             if len(set(names)) < len(names):
-                raise InputError(f"--{flag}: a name comes twice in {','.join(names)}; name each once.")
+                raise InputError(f"--{flag}: a name is repeated in {','.join(names)}; name each once.")
         if not 0.0 <= self.jitter <= 45.0:
             raise InputError(f"--jitter: expected degrees from 0 to 45; got {self.jitter:g}.")
 
     def recipe(self) -> dict[str, Any]:
-        """What a manifest keeps; speakers and emotions by name even if all take part."""
+        """Settings for the manifest; speakers and emotions by name even if all of them take part."""
         return {
             "reader": "talker",
             **asdict(self),
@@ -63,15 +63,15 @@ class TalkerOptions:
         }
 
     def roles(self) -> list[Role]:
-        """Who says what in each recording."""
+        """Arguments of each recording."""
         return cast(self.minutes, self.seed, self.speakers, self.emotions)
 
 
 def generate_rows(role: Role, jitter: float, fingers: bool, view: str, features: Features) -> Prepared:
     """One generated recording as rows."""
-    seen = find_view(view)
-    recording = talk(**role, fps=features.fps, sample_rate=features.mel.sample_rate, fingers=fingers or seen.fingers)
+    chosen = find_view(view)
+    recording = talk(**role, fps=features.fps, sample_rate=features.mel.sample_rate, fingers=fingers or chosen.fingers)
     if jitter > 0.0:
         rng = np.random.default_rng([role["seed"], _JITTER])
         recording = replace(recording, motion=add_jitter(recording.motion, jitter, rng))
-    return prepare_recording(seen.look(recording, features.fps), replace(features, joints="all"))
+    return prepare_recording(chosen.convert(recording, features.fps), replace(features, joints="all"))

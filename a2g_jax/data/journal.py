@@ -1,7 +1,7 @@
-"""A corpus in the making: a hidden folder beside its place, from which a killed preparation goes on.
+"""An unfinished corpus: a hidden folder beside its final place, from which a killed preparation resumes.
 
-Every finished recording is a line in a journal that reached the disk after its rows. Going on, the rows of the lines
-that hold are kept and whatever follows them is cut off, so the finished corpus is the same byte for byte.
+Every finished recording is a line in a journal, which reaches the disk after its rows. Resuming keeps the rows of valid
+lines and cuts off all that follows, so the finished corpus is the same byte for byte.
 """
 
 import hashlib
@@ -35,7 +35,7 @@ class Unfinished:
     def __init__(self, folder: Path, features: Features) -> None:
         self.folder = folder
         self.corpus = folder / "corpus"
-        """The corpus itself, to be moved to its place when it is complete."""
+        """The corpus itself, to be moved to its final place when it is complete."""
         self.entries: list[Entry] = []
         self.skipped: list[Skipped] = []
         """Recordings that could not be prepared."""
@@ -54,32 +54,32 @@ class Unfinished:
 
     @property
     def done(self) -> int:
-        """Recordings that are seen to, prepared or skipped."""
+        """Number of finished recordings, prepared or skipped."""
         return len(self.entries) + len(self.skipped)
 
     def recover(self, sources: Sequence[tuple[str, tuple[str, ...]]]) -> tuple[int, int]:
-        """Keep the recordings that are still good, in order, and cut off the rest.
+        """Keep the recordings that are still valid, in order, and cut off the rest.
 
-        Returns how many are kept, and how many there were.
+        Returns the numbers of those kept and of those found.
 
         Args:
-            sources: name and files of every recording that the corpus shall have.
+            sources: name and files of every recording of the corpus.
         """
         make_folder(self.corpus / "annotations")
         lines = self._journal_lines()
-        good = 0
+        valid = 0
         for line, (name, files) in zip(lines, sources, strict=False):
-            if not self._take(line, name, files):
+            if not self._accept(line, name, files):
                 break
-            good += 1
-        self._cut(lines[:good])
-        return good, len(lines)
+            valid += 1
+        self._cut(lines[:valid])
+        return valid, len(lines)
 
     def append(self, item: Prepared) -> None:
-        """Add a recording; when this returns it is on the disk.
+        """Add a recording; it is on the disk when this returns.
 
         Raises:
-            InputError: it has other joints than those before it.
+            InputError: its joints differ from those of the recordings before it.
         """
         self._check_body(item)
         values = (item.audio, item.pose, item.root, item.waveform)[: len(self._arrays)]
@@ -123,7 +123,7 @@ class Unfinished:
             os.fsync(journal.fileno())
 
     def _hash_sources(self, sources: tuple[str, ...]) -> dict[str, str]:
-        """SHA-256 of files; large ones are the sources of many recordings, and are read once."""
+        """SHA-256 of files, each read once: large ones are the sources of many recordings."""
         for source in sources:
             if source not in self._hashes:
                 try:
@@ -160,10 +160,10 @@ class Unfinished:
             difference = np.abs(body.offsets[1:] - self.body.offsets[1:]).max(initial=0)
             self.spread = max(self.spread, float(difference))
         elif not _same_rows(self.body, body):
-            raise InputError(f"{where}: has other points or bones than the recordings before it; prepare it apart.")
+            raise InputError(f"{where}: has other points or bones than those before it; prepare it separately.")
 
     def _journal_lines(self) -> list[dict[str, Any]]:
-        """What the journal tells, up to the first line that a kill cut short or that was damaged."""
+        """Lines of the journal up to the first that is incomplete or damaged."""
         values: list[dict[str, Any]] = []
         with suppress(OSError, UnicodeDecodeError):
             for line in (self.folder / _JOURNAL).read_text(encoding="utf-8").split("\n")[:-1]:
@@ -173,8 +173,8 @@ class Unfinished:
                 values.append(json.loads(text))
         return values
 
-    def _take(self, line: dict[str, Any], name: str, files: tuple[str, ...]) -> bool:
-        """Whether a recording is whole on the disk and made from the files as they are now; if so, count it in."""
+    def _accept(self, line: dict[str, Any], name: str, files: tuple[str, ...]) -> bool:
+        """Whether a recording is complete on the disk and its sources are unchanged; if so, add it to the entries."""
         if "skipped" in line:
             skipped = Skipped(name, files, line["skipped"]["reason"])
             if line["skipped"]["name"] != name or line["sources"] != self._hash_sources(files):
@@ -212,7 +212,7 @@ class Unfinished:
 
     def _cut(self, lines: list[dict[str, Any]]) -> None:
         journal = self.folder / _JOURNAL
-        # The journal first: a line never tells of rows that are gone.
+        # The journal first: no line may be left without its rows.
         temporary = journal.with_suffix(".new")
         temporary.write_text("".join(_sealed(json.dumps(line)) for line in lines), encoding="utf-8", newline="\n")
         temporary.replace(journal)

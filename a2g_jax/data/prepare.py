@@ -1,4 +1,4 @@
-"""Whole corpora, with progress: generated, or from the recordings of a data set."""
+"""Preparation of a whole corpus with a progress bar: generated, or from the recordings of a data set."""
 
 import os
 from collections.abc import Callable, Generator, Iterable, Sequence
@@ -30,17 +30,17 @@ def prepare_talker(
     workers: int | None = None,
     on_demand: OnDemand | None = None,
 ) -> Corpus:
-    """A generated corpus; the same for any number of workers.
+    """Write a generated corpus; the same for any number of workers.
 
     Args:
-        features: how audio is looked at, and how rotations are written down where the view has them; the rate and
+        features: audio features, and the representation of rotations where the view has them; the frame rate and
             other poses are those of the options.
-        workers: processes that generate; one for every core if None.
-        on_demand: store only a first part, and leave the rest of the training recordings to be generated in training.
+        workers: number of processes; one for every core if None.
+        on_demand: store only a first part of the training recordings; the rest is generated during training.
 
     Raises:
         InputError: the folder exists, or there are too few minutes.
-        Interrupted: by Ctrl-C; the same call goes on.
+        Interrupted: by Ctrl-C; the same call resumes.
     """
     features, poses = features or Features(), view_poses(options.view)
     pose = features.pose if features.pose in poses else poses[0]
@@ -60,7 +60,7 @@ def prepare_talker(
 
 
 def view_poses(view: str) -> tuple[str, ...]:
-    """How the poses of a view of the talker can be written down, the usual way first."""
+    """Representations of the poses of a view of the talker, the default first."""
     pose = find_view(view).pose
     return interchangeable(pose)
 
@@ -77,20 +77,20 @@ def prepare_data_set(
     limit: int | None = None,
     workers: int | None = None,
 ) -> Corpus:
-    """A corpus from recordings on disk, in any of the layouts that :mod:`a2g_jax.data.datasets` reads.
+    """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
     Args:
-        name: of the data set.
+        name: of the data set, as for :func:`~a2g_jax.data.datasets.find_data_set`.
         source: its folder.
-        seed: of the split, where the data set's authors made none.
-        official: keep to the authors' split.
-        skip_broken: note recordings that cannot be prepared in the manifest and leave them out.
-        limit: take only so many recordings, spread evenly over all.
-        workers: processes that prepare; one for every core if None.
+        seed: of the split, where the data set has no official one.
+        official: use the official split.
+        skip_broken: leave out recordings that cannot be prepared, and note them in the manifest.
+        limit: largest number of recordings, spread evenly over all.
+        workers: number of processes; one for every core if None.
 
     Raises:
-        InputError: the folder exists, the source is not laid out so, or something is wrong with a recording.
-        Interrupted: by Ctrl-C; the same call goes on.
+        InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
+        Interrupted: by Ctrl-C; the same call resumes.
     """
     reader, folder = find_data_set(name), Path(source)
     takes = reader.find(folder)
@@ -98,7 +98,7 @@ def prepare_data_set(
         takes = [takes[number * len(takes) // limit] for number in range(limit)]
     if official and takes and all(take.split in ("validation", "test") for take in takes):
         raise InputError(
-            f"{folder}: by the authors' split all {len(takes)} recordings are for testing and validation, none for"
+            f"{folder}: all {len(takes)} recordings are for validation and testing in the official split, none for"
             " training; add training recordings, or split by the seed with --random-split."
         )
     read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken)
@@ -111,17 +111,19 @@ def prepare_data_set(
 def _make(
     what: str, work: Callable[[Any], Prepared | Skipped], inputs: Sequence[Any], workers: int | None, done: int
 ) -> Generator[Prepared | Skipped, None, None]:
-    """Rows of the inputs after those that are done, in order, with progress."""
+    """Rows of the inputs after the finished ones, in order, with a progress bar."""
     rest = inputs[done:]
     # Starting a process costs as much as a few recordings.
     count = min(os.cpu_count() or 1, len(rest) // 4) if workers is None else min(workers, len(rest))
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar(len(inputs), what, "recording"))
-        # What was done before does not count for the rate.
+        # Recordings finished before do not count for the rate.
         bar.initial = bar.n = done
         rows: Iterable[Prepared | Skipped] = map(work, rest)
         if count > 1:
-            pool = stack.enter_context(worker_pool(count, "the same command goes on, with fewer --workers if need be"))
+            pool = stack.enter_context(
+                worker_pool(count, "run the same command to resume, with fewer --workers if necessary")
+            )
             rows = in_order(pool, work, rest, 2 * count + 2)
         for prepared in rows:
             yield prepared
@@ -131,7 +133,7 @@ def _make(
 def _read_rows(take: Take, name: str, features: Features, skip_broken: bool) -> Prepared | Skipped:
     try:
         recording = find_data_set(name).read(take, features.mel.sample_rate)
-        # A corpus knows a recording by the name and the files of its take.
+        # In a corpus a recording has the name and the files of its take.
         recording = replace(recording, name=take.name, sources=take.sources)
         return prepare_recording(recording, features, take.split)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""One recording: speech, the motion made with it, and what is known about both."""
+"""One recording: speech, its motion and annotations."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +13,7 @@ from a2g_jax.io.words import Word as Word
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Speech:
-    """Speech audio and what is known about it; whatever else is recorded with it also starts at time zero."""
+    """Speech audio with its annotations; everything recorded with it also starts at time zero."""
 
     name: str
     """Unique within a corpus."""
@@ -24,9 +24,9 @@ class Speech:
     speaker: str = ""
     emotion: str = ""
     sources: tuple[str, ...] = ()
-    """Files it was read from; empty for a generated one."""
+    """Files that it was read from; empty for a generated recording."""
     annotations: dict[str, Any] = field(default_factory=dict)
-    """Anything else that is known, as JSON-able values; times in seconds."""
+    """Further annotations as JSON values; times in seconds."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,4 +1,4 @@
-"""What a corpus keeps of a recording, and the settings of the papers."""
+"""Features that a corpus has of each recording, and the papers' settings of them."""
 
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -17,14 +17,14 @@ class Features:
     fps: float = 30.0
     mel: MelConfig = field(default_factory=MelConfig)
     pose: str = "6d"
-    """A representation that :mod:`a2g_jax.geometry.pose_space` knows."""
+    """A representation of :mod:`a2g_jax.geometry.pose_space`."""
     joints: str = "body"
     """``"body"``: the 22 body joints; ``"upper-body"``: 47 joints with fingers; ``"all"``: the rig as it is."""
     waveform: bool = False
-    """Whether the audio itself is kept too, as 16-bit samples, for models that look at it otherwise."""
+    """Whether the corpus also has the audio as 16-bit samples, for models with other audio features."""
 
     def __post_init__(self) -> None:
-        """Refuse what there is not."""
+        """Raise ``InputError`` for an unknown name."""
         if self.pose not in WIDTHS:
             raise InputError(f"--pose: there is no {self.pose!r}; there are: {', '.join(WIDTHS)}.")
         if self.joints not in JOINTS:
@@ -37,7 +37,7 @@ class Features:
 
 _FLOW_RANGE = 80.0
 
-#: By the name of the paper and the data it takes.
+#: By paper and data.
 PRESETS: dict[str, Features] = {
     # Audio2Gestures, Sec. 5.3.1: 64 bands at the motion's 30 frames a second, body joints in 6D.
     "audio2gestures": Features(),
@@ -57,10 +57,10 @@ PRESETS: dict[str, Features] = {
 
 
 def find_features(name: str) -> Features:
-    """The settings of a paper.
+    """The features of a paper.
 
     Raises:
-        InputError: there are none of that name.
+        InputError: unknown name.
     """
     if name not in PRESETS:
         raise InputError(f"--features: there is no {name!r}; there are: {', '.join(PRESETS)}.")

@@ -1,11 +1,11 @@
-"""Which stretches of which recordings are for training, validation and testing."""
+"""Splits of recordings into training, validation and test segments."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-#: Fewer recordings than this are split in time instead of among them.
+#: Fewer recordings than this are split in time instead of by recording.
 _FEW = 5
 
 
@@ -26,10 +26,10 @@ Splits = dict[str, list[Segment]]
 
 
 def split_recordings(frames: list[int], seed: int, shares: tuple[float, float, float] = (0.8, 0.1, 0.1)) -> Splits:
-    """Train, validation and test parts, in those shares.
+    """Train, validation and test segments, in those shares.
 
-    With five recordings or more, whole recordings are dealt out in an order shuffled by the seed, so no speech is in
-    two splits. With fewer, each is cut in time: its first part trains, its last tests.
+    Five recordings or more are assigned whole, in an order shuffled by the seed, so no speech is in two splits. With
+    fewer, each is cut in time: the first part is for training, the last for testing.
 
     Args:
         frames: length of every recording.
@@ -43,9 +43,9 @@ def split_recordings(frames: list[int], seed: int, shares: tuple[float, float, f
                     splits[name].append(Segment(index, start, stop))
         return splits
     order = np.random.default_rng(seed).permutation(len(frames))
-    held = [max(1, round(len(frames) * share)) for share in shares[1:]]
-    validation, test = sorted(order[: held[0]]), sorted(order[held[0] : sum(held)])
-    train = sorted(order[sum(held) :])
+    sizes = [max(1, round(len(frames) * share)) for share in shares[1:]]
+    validation, test = sorted(order[: sizes[0]]), sorted(order[sizes[0] : sum(sizes)])
+    train = sorted(order[sum(sizes) :])
     return {
         name: [Segment(int(index), 0, frames[index]) for index in indices]
         for name, indices in (("train", train), ("validation", validation), ("test", test))
@@ -53,15 +53,15 @@ def split_recordings(frames: list[int], seed: int, shares: tuple[float, float, f
 
 
 def official_splits(frames: list[int], parts: Sequence[str], seed: int) -> Splits:
-    """The parts that a data set's authors chose, completed where they chose none.
+    """A data set's official split, completed where it is silent.
 
-    Recordings without a part train. Where nobody is named for validation a tenth of the training recordings is taken
-    for it, by the seed (in time, as :func:`split_recordings` does it, where there are fewer than five); a data set that
-    names no part at all is dealt out by :func:`split_recordings`.
+    Recordings without a part are for training. Without a validation part, a tenth of the training recordings becomes
+    one, by the seed (in time, as in :func:`split_recordings`, where there are fewer than five). Without any official
+    part, :func:`split_recordings` splits.
 
     Args:
         frames: length of every recording.
-        parts: ``"train"``, ``"validation"``, ``"test"`` or an empty text for each recording.
+        parts: ``"train"``, ``"validation"``, ``"test"`` or an empty string for each recording.
     """
     if not any(parts):
         return split_recordings(frames, seed)
@@ -71,7 +71,7 @@ def official_splits(frames: list[int], parts: Sequence[str], seed: int) -> Split
     if not splits["validation"] and splits["train"]:
         train = [segment.recording for segment in splits["train"]]
         drawn = split_recordings([frames[index] for index in train], seed, (0.9, 0.1, 0.0))
-        # With five recordings or more at least one would be put into each part: that of the test goes back.
+        # With five recordings or more, each part gets at least one: the test part goes back to training.
         drawn["train"] = sorted(drawn["train"] + drawn.pop("test"))
         for name, segments in drawn.items():
             splits[name] = [Segment(train[number], start, stop) for number, start, stop in segments]

@@ -1,4 +1,4 @@
-"""Worker processes that work ahead in order, die with their parent, and say so when they die before it."""
+"""Worker processes that work ahead in order, end with their parent, and are reported when they die before it."""
 
 import itertools
 import multiprocessing
@@ -19,16 +19,16 @@ Result = TypeVar("Result")
 
 
 class WorkerDiedError(A2GError):
-    """A worker process ended before its work was done, killed from outside or for want of memory."""
+    """A worker process ended before its work was finished: killed, or out of memory."""
 
 
 @contextmanager
-def worker_pool(workers: int, mend: str, nice: int = 0) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(workers: int, fix: str, nice: int = 0) -> Iterator[ProcessPoolExecutor]:
     """A pool of fresh processes; work that has not begun when the block ends is dropped.
 
     Args:
-        mend: what the user can do if a worker dies.
-        nice: how far the workers step back behind other processes (see ``nice(1)``).
+        fix: what the user can do if a worker dies.
+        nice: priority of the workers below that of other processes (see ``nice(1)``).
 
     Raises:
         WorkerDiedError: a worker died.
@@ -36,17 +36,17 @@ def worker_pool(workers: int, mend: str, nice: int = 0) -> Iterator[ProcessPoolE
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(nice,))
     try:
-        with _interrupts_held():
+        with _interrupts_blocked():
             pool.submit(int)  # the first piece of work starts all processes
         yield pool
     except BrokenProcessPool:
-        raise WorkerDiedError(f"a worker process died, killed from outside or for want of memory; {mend}.") from None
+        raise WorkerDiedError(f"a worker process died, killed from outside or for lack of memory; {fix}.") from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 def in_order(pool: ProcessPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], ahead: int) -> Iterator:
-    """Results of the items, in their order, never more than ``ahead`` of them worked on or waiting."""
+    """Results of the items in order; at most ``ahead`` of them are in progress or waiting."""
     rest = iter(items)
     waiting: deque[Future[Result]] = deque(pool.submit(work, item) for item in itertools.islice(rest, ahead))
     while waiting:
@@ -55,10 +55,10 @@ def in_order(pool: ProcessPoolExecutor, work: Callable[[Item], Result], items: I
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits until the block ends; processes started in it never get it.
+def _interrupts_blocked() -> Iterator[None]:
+    """Delay Ctrl-C until the block ends; processes started in it never receive it.
 
-    It reaches every process of a terminal, and a worker that is still starting would die of it.
+    It reaches every process of a terminal, and would end a worker that is still starting.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -71,7 +71,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _begin(nice: int) -> None:
-    # The parent alone decides what Ctrl-C means.
+    # Only the parent handles Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if nice and hasattr(os, "nice"):
         os.nice(nice)
@@ -79,7 +79,7 @@ def _begin(nice: int) -> None:
 
 
 def _end_with_parent() -> None:
-    """A killed parent cannot end its workers, which would wait for work for ever."""
+    """Exit when the parent ends: a killed parent cannot stop its workers, which would wait for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

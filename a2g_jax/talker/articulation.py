@@ -1,4 +1,4 @@
-"""Turns a plan into what the vocal tract does over time: formants, nasality, and the levels of the sound sources."""
+"""Control tracks of the vocal tract for a speech plan: formants, nasality and the levels of the sound sources."""
 
 from dataclasses import dataclass, replace
 
@@ -42,7 +42,7 @@ class _Curve:
         self.values: list[float] = []
 
     def hold(self, start: float, end: float, value: float, ramp: float) -> None:
-        """A plateau that leaves ``ramp`` seconds at both ends for the transitions."""
+        """Add a plateau that leaves ``ramp`` seconds at both ends for the transitions."""
         ramp = min(ramp, 0.45 * (end - start))
         self.times += [start + ramp, end - ramp]
         self.values += [value, value]

@@ -1,4 +1,4 @@
-"""Makes clean generated speech sound recorded: equaliser, small room, noise and gain."""
+"""Augmentation that makes clean generated speech sound recorded: equaliser, small room, noise and gain."""
 
 import numpy as np
 from jaxtyping import Float
@@ -33,7 +33,7 @@ def augment(audio: Float[np.ndarray, " N"], sample_rate: int, rng: np.random.Gen
     Random equaliser (standard deviation 4 dB), small room (direct-to-reverberant ratio 6 to 20 dB), coloured noise at a
     signal-to-noise ratio of 15 to 40 dB, and gain of +-6 dB.
     """
-    # The room's noise takes as many draws as there are samples: it has a stream of its own.
+    # The number of draws of the room and of the noise depends on the samples: each has a stream of its own.
     echoes, hiss = rng.spawn(2)
     response = _room_response(sample_rate, echoes)
     size = fft.next_fast_len(len(audio) + len(response), real=True)

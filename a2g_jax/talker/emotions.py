@@ -1,4 +1,4 @@
-"""What the eight emotions of BEAT do to a voice.
+"""Changes of a voice by the eight emotions of BEAT.
 
 Directions relative to neutral, and where they come from:
 
@@ -9,7 +9,7 @@ Directions relative to neutral, and where they come from:
   disgust slightly wider. Intensity: anger and happiness higher, fear normal, sadness and disgust lower. Quality: anger
   breathy with chest tone, happiness breathy, sadness resonant, fear irregular voicing, disgust grumbled. Articulation:
   anger tense, sadness slurred, fear precise.
-- Where sources differ we take a side. Fear's range: much wider there, but small F0 variability in the meta-analysis of
+- Where sources differ, we follow one. Fear's range: much wider there, but small F0 variability in the meta-analysis of
   Juslin & Laukka 2003; ours is a little wider. Anger's voice: breathy there; ours is pressed, with strong high
   frequencies, as in Juslin & Laukka 2003 and in hot anger of Banse & Scherer 1996. Sadness: weak high frequencies in
   both; our breathiness is a choice (theirs is "resonant").
@@ -67,8 +67,8 @@ VOICE_EMOTIONS: dict[str, VoiceEmotion] = {
 """The eight emotions by name, in the order of BEAT's labels."""
 
 
-def shown(emotion: VoiceEmotion, strength: float) -> VoiceEmotion:
-    """The emotion shown more (strength above 1) or less strongly: deviations from neutral scale with ``strength``."""
+def scaled(emotion: VoiceEmotion, strength: float) -> VoiceEmotion:
+    """The emotion with its deviations from neutral times ``strength`` (factors to its power)."""
     return replace(
         emotion,
         f0_shift_semitones=strength * emotion.f0_shift_semitones,

@@ -1,8 +1,8 @@
-"""What is true on average: expectations over all right motions of a recording, by sampling, with standard errors.
+"""Expectations over all valid motions of a generated recording, by sampling, with standard errors.
 
-For a generated recording the true conditional distribution of motion given audio can be sampled. So a score's expected
-value, the true multimodality, and the best and worst that a metric can say (its ceiling and floor) are known up to a
-standard error that falls with the number of draws. For what is known exactly see
+The true conditional distribution of motion given audio can be sampled for a generated recording. A score's expected
+value, the true multimodality, and a metric's best and worst reachable value (its ceiling and floor) are therefore
+estimated with a standard error that falls with the number of draws. For exact values see
 :mod:`a2g_jax.talker.hidden_choices`.
 """
 
@@ -24,7 +24,7 @@ from a2g_jax.talker.hidden_choices import speech_plan
 from a2g_jax.talker.recordings import resample_motion
 
 Score = Callable[[Motion, Recording], float]
-"""A metric of one motion for one recording's audio (and, where the metric wants it, its recorded motion)."""
+"""A metric of one motion for one recording's audio (and, where the metric uses it, its recorded motion)."""
 Distance = Callable[[Motion, Motion], float]
 
 
@@ -34,23 +34,23 @@ class Estimate(NamedTuple):
     mean: float
     standard_error: float
     draws: int
-    """Independent motions that were drawn for it."""
+    """Number of independent motions."""
 
 
 class Bounds(NamedTuple):
-    """What a metric says about right and about unrelated motion."""
+    """A metric's values for valid and for unrelated motion."""
 
     ceiling: Estimate
-    """Of another right motion of the same recording: no model that is right can be expected to do better."""
+    """Of another valid motion of the same recording: a perfect model's expected value."""
     floor: Estimate
-    """Of right motions of another recording of the same speaker: what a model gets that does not listen."""
+    """Of valid motions of another recording of the same speaker: the value of a model that ignores the audio."""
 
 
 def sample_mean(values: Float[np.ndarray, " n"]) -> Estimate:
-    """Mean of independent values; its standard error is their deviation over the square root of their number.
+    """Mean of independent values; its standard error is their standard deviation over the square root of their number.
 
     Raises:
-        ValueError: fewer than two values, which tell nothing about their spread.
+        ValueError: fewer than two values, which have no estimate of spread.
     """
     count = len(values)
     if count < 2:
@@ -82,7 +82,7 @@ def pair_mean(distances: Float[np.ndarray, "n n"]) -> Estimate:
 
 
 def expect(recording: Recording, score: Score, draws: int, key: Any, *, workers: int = 1) -> Estimate:
-    """Expectation of ``score(motion, recording)`` over the right motions of a generated recording.
+    """Expectation of ``score(motion, recording)`` over the valid motions of a generated recording.
 
     Args:
         score: any function of a motion and the recording; with several workers one that can be pickled.
@@ -97,7 +97,7 @@ def expect(recording: Recording, score: Score, draws: int, key: Any, *, workers:
 
 
 def expected_multimodality(recording: Recording, distance: Distance, draws: int, key: Any) -> Estimate:
-    """The true multimodality: expected distance between two independent right motions of one recording.
+    """The true multimodality: expected distance between two independent valid motions of one recording.
 
     All ``draws * (draws - 1) / 2`` pairs of ``draws`` motions are compared; see :func:`pair_mean` for the standard
     error. The motions are held in memory together: 1.1 MB for every second of 20 of them, of 52 joints at 30 frames
@@ -118,7 +118,7 @@ def expected_multimodality(recording: Recording, distance: Distance, draws: int,
 
 
 def bounds(recording: Recording, other: Recording, score: Score, draws: int, key: Any, *, workers: int = 1) -> Bounds:
-    """Ceiling and floor of a metric: right motions of this recording, and of another one, scored against this one.
+    """Ceiling and floor of a metric: valid motions of this recording, and of another one, scored against this one.
 
     Args:
         other: of the same speaker, at the same rate, on the same skeleton, at least as long; its motions are cut to
@@ -136,7 +136,7 @@ def bounds(recording: Recording, other: Recording, score: Score, draws: int, key
         (theirs.frames < ours.frames, "is shorter than"),
     ):
         if wrong:
-            raise InputError(f"{other.name}: {what} {recording.name}; a floor needs another talk, made alike.")
+            raise InputError(f"{other.name}: {what} {recording.name}; a floor needs another one of the same kind.")
     return Bounds(
         expect(recording, score, draws, key, workers=workers),
         sample_mean(_scores(other, recording, score, draws, key, workers)),
@@ -156,7 +156,7 @@ def draw_key(key: Any, index: int) -> int:
 def _scores(
     source: Recording, target: Recording, score: Score, draws: int, key: Any, workers: int
 ) -> Float[np.ndarray, " n"]:
-    """Scores against ``target`` of right motions of ``source``."""
+    """Scores against ``target`` of valid motions of ``source``."""
     keys = [draw_key(key, index) for index in range(draws)]
     if workers <= 1:
         return np.array([_score(source, target, score, each) for each in keys])

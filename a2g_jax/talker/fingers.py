@@ -1,4 +1,4 @@
-"""Finger motion: hand shapes of each gesture family, led by the arms' phases.
+"""Finger motion: hand shapes of each gesture family, timed by the arms' phases.
 
 A hand has twelve channels (radians): flexion of the knuckles (MCP) of index, middle, ring and little finger, flexion
 of their middle joints (PIP; the end joints follow by two thirds, as tendons couple them), spread, and the thumb's
@@ -31,7 +31,7 @@ _COLUMNS = {"Index": 0, "Middle": 1, "Ring": 2, "Pinky": 3}
 _SPREAD = {"Index": 1.0, "Middle": 0.12, "Ring": -0.7, "Pinky": -1.45}
 """Share of the spread channel by finger; positive toward the thumb."""
 _THUMB_BEND = np.array([0.25, -0.62, -0.74])
-"""Where the thumb's end bends to, in the left hand at rest: under the palm."""
+"""Direction in which the thumb's end bends, in the left hand at rest: under the palm."""
 
 Shape = Float[np.ndarray, " 12"]
 
@@ -72,24 +72,24 @@ _IDLE = np.deg2rad([2.0, 2.0, 2.2, 2.6, 2.6, 2.6, 2.8, 3.0, 0.9, 2.0, 2.0, 2.0])
 def _counting(number: int) -> Shape:
     """A hand that shows ``number`` fingers, 1 to 5: index first, the thumb last."""
     shape = _SHAPES["point"].copy()
-    shown = _SHAPES["open"]
+    stretched = _SHAPES["open"]
     for column in range(min(number, 4)):
-        shape[column], shape[4 + column] = shown[column], shown[4 + column]
+        shape[column], shape[4 + column] = stretched[column], stretched[4 + column]
     shape[8] = np.deg2rad(4.0) if number > 1 else 0.0
     if number >= 5:
-        shape[9:] = shown[9:]
+        shape[9:] = stretched[9:]
     return shape
 
 
 def plan_fingers(
     hand: str, draws: GestureDraws, phases: Sequence[PhaseSpan], style: GestureStyle, rng: np.random.Generator
 ) -> Track:
-    """Channels of one hand over a recording, led by the strokes of its arm.
+    """Channels of one hand over a recording, timed by the strokes of its arm.
 
     Args:
         hand: 'left' or 'right'.
-        draws, phases: what the arms do.
-        rng: draws how each unit's hand looks; all draws are continuous.
+        draws, phases: of the arms.
+        rng: of each unit's hand shape; all draws are continuous.
     """
     rest = _REST_SHAPES[draws.rest_pose] * rng.uniform(0.85, 1.15) + rng.normal(0.0, np.deg2rad(3.0), CHANNELS)
     track = Track(rest)
@@ -114,7 +114,7 @@ def _gesture(
     style: GestureStyle,
     rng: np.random.Generator,
 ) -> None:
-    """The hand forms on the way to each stroke, tightens with it, slackens between strokes and falls back to rest."""
+    """Add one unit: the hand takes shape before each stroke, tightens with it and slackens after it."""
     slack = 1.0 - 0.6 * min(style.tension, 1.0)
     weights: dict[str, np.ndarray] = {}
     for order, (index, span) in enumerate(zip(unit.strokes, spans, strict=True)):
@@ -126,7 +126,7 @@ def _gesture(
         if stroke.family == "list":
             shape = _counting(order + 1)
         shape = shape + rng.normal(0.0, np.deg2rad(2.5), CHANNELS)
-        # Strong accents and tense speakers leave less of the relaxed hand.
+        # Strong accents and tension bring the hand further from its relaxed shape.
         effort = min(0.75 + 0.25 * stroke.size + 0.2 * style.tension, 1.0)
         shape = _RELAXED + effort * (shape - _RELAXED)
         earlier = spans[order - 1].end if order else span.start - 0.55 / style.speed
@@ -166,7 +166,7 @@ def finger_rotations(
 
     Args:
         side: +1 left, -1 right.
-        rng: draws the fingers' idle life.
+        rng: of the fingers' idle movement.
     """
     idle = draw_waves(rng, _IDLE * (1.0 - 0.5 * min(style.tension, 1.0)), 0.1, 0.9).sample(times)
     stiff = 1.0 - 0.6 * min(style.tension, 1.0)

@@ -1,4 +1,4 @@
-"""Which syllables get strokes (determined by the plan), and the hidden choices drawn for them."""
+"""Selection of the syllables with strokes, which the plan determines, and the hidden choices drawn for them."""
 
 import math
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ def other_families(style: GestureStyle, hand: str, family: str) -> tuple[float, 
 def accented_syllables(plan: SpeechPlan, threshold: float, spacing: float) -> list[int]:
     """Indices of the syllables whose accent passes ``threshold``, the stronger first, ``spacing`` seconds apart.
 
-    Deterministic: this is what makes the times of strokes and nods predictable from the audio.
+    Deterministic, so the times of strokes and nods are predictable from the audio.
     """
     taken: list[int] = []
     accents = [(-s.accent, s.peak, index) for index, s in enumerate(plan.syllables) if s.accent >= threshold]

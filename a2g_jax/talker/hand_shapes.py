@@ -1,4 +1,4 @@
-"""Where the hands go in each gesture family and rest pose.
+"""Hand positions and wrist angles of each gesture family and rest pose.
 
 An arm's control has nine channels: the wrist's place ``out`` (away from the midline, to its own side), ``up`` and
 ``fwd`` from the chest joint (metres, upright axes that turn with the chest), ``supination``, ``palmar`` flexion and
@@ -20,9 +20,9 @@ Control = Float[np.ndarray, " 9"]
 _SHOULDER = np.array([0.172, 0.142, 0.0])
 """The shoulder from the chest joint, metres: out, up, forward."""
 _COMFORT = 0.945 * (UPPER_ARM + FOREARM)
-"""Strokes lead no further from the shoulder than this, metres: elbows stay bent by 38 degrees or more."""
+"""Largest distance of a stroke from the shoulder, metres: elbows stay bent by 38 degrees or more."""
 _CLOSEST = 0.27
-"""Nor closer to it than this, metres: an arm folded further is an arm in the way."""
+"""Smallest distance of a stroke from the shoulder, metres: an arm folded further is in the way."""
 
 _PLACES: dict[str, tuple[float, float, float]] = {
     "center": (0.155, -0.085, 0.295),
@@ -62,7 +62,7 @@ def _at_most(value: float, most: float, width: float) -> float:
 
 
 def _within_reach(place: Float[np.ndarray, " 3"], closest: float) -> tuple[float, float, float]:
-    """Keep a place where arms are comfortable: bent elbows, not over the shoulder, not tight before the chest.
+    """Move a place to where arms are comfortable: bent elbows, not over the shoulder, not close to the chest.
 
     ``closest`` is the least distance from the midline: two working hands leave room for each other's fingers.
     """
@@ -133,7 +133,7 @@ def stroke_controls(
     Args:
         order, count: which stroke of how many in the unit.
         size: 0 to 1, from the accent.
-        before: where the unit's last stroke arrived; the hand does not go all the way back to begin anew.
+        before: where the unit's last stroke arrived; the hand does not go all the way back for the next one.
         drift: how far the unit has wandered from its place, metres.
     """
     shape = _SHAPES[family]

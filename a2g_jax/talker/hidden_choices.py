@@ -1,6 +1,6 @@
-"""The discrete hidden choices of a generated recording, in closed form: how much is open, how often two draws agree.
+"""Entropy and agreement of the discrete hidden choices of a generated recording, in closed form.
 
-What is here follows from the speaker's probabilities alone; nothing is sampled.
+They follow from the speaker's probabilities alone; nothing is sampled.
 """
 
 from typing import NamedTuple
@@ -28,13 +28,13 @@ class Choice(NamedTuple):
     """One kind of hidden choice in one recording."""
 
     times: int
-    """How often it is made."""
+    """How often it is made in the recording."""
     entropy: float
     """Of one such choice, given the choices before it; nats."""
     agreement: float
-    """Probability that two independent draws make one such choice alike."""
+    """Probability that two independent draws agree in one such choice."""
     full_agreement: float
-    """Probability that two independent draws make every such choice in the recording alike."""
+    """Probability that two independent draws agree in every such choice of the recording."""
 
     @property
     def total_entropy(self) -> float:
@@ -43,7 +43,7 @@ class Choice(NamedTuple):
 
 
 def speech_plan(recording: Recording) -> SpeechPlan:
-    """What is said in a generated recording.
+    """The speech plan of a generated recording.
 
     Raises:
         InputError: the recording is not a generated one.
@@ -58,7 +58,7 @@ def hidden_choices(recording: Recording) -> dict[str, Choice]:
 
     Chosen once: ``"rest_pose"`` and ``"posture"``. For each gesture unit: ``"hand"``, ``"place"``, ``"hold"`` and
     ``"family"``, whose probabilities depend on the hand. For each stroke after a unit's first: ``"stroke_family"``,
-    which is the unit's family or now and then another one; its ``full_agreement`` is of all strokes, the first ones
+    which is the unit's family or occasionally another one; its ``full_agreement`` is of all strokes, the first ones
     included. Entropies are conditional, so they add up (see :func:`hidden_entropy`); agreements are of the kind alone,
     whatever the choices before.
 
@@ -82,7 +82,7 @@ def hidden_choices(recording: Recording) -> dict[str, Choice]:
 def hidden_entropy(recording: Recording) -> float:
     """Entropy, nats, of all discrete hidden choices of a generated recording: minus the expected log-probability.
 
-    The least that any model's mean negative log-likelihood of these choices can be.
+    A lower bound on any model's mean negative log-likelihood of these choices.
     """
     return sum(choice.total_entropy for choice in hidden_choices(recording).values())
 
@@ -93,7 +93,7 @@ def _independent(times: int, probabilities: Float[np.ndarray, " n"]) -> Choice:
 
 
 def _families(sizes: list[int], style: GestureStyle) -> dict[str, Choice]:
-    """The families of units with so many strokes, and of the strokes themselves."""
+    """The families of units, and those of their strokes; ``sizes`` are the units' numbers of strokes."""
     hands = np.array(hand_probabilities(style))
     given = np.array([family_probabilities(style, hand) for hand in HANDS])
     joint = hands[:, None] * given
@@ -115,6 +115,6 @@ def _families(sizes: list[int], style: GestureStyle) -> dict[str, Choice]:
 
 
 def entropy(probabilities: Float[np.ndarray, " n"]) -> float:
-    """``-sum p ln p`` in nats; what cannot happen adds nothing."""
+    """``-sum p ln p`` in nats; outcomes of probability 0 add nothing."""
     likely = probabilities[probabilities > 0.0]
     return float(-np.sum(likely * np.log(likely)))

@@ -44,7 +44,7 @@ def _unit(vectors: Vectors) -> Vectors:
 
 
 def soft_reach(reach: Angles, length: float) -> Angles:
-    """Limit a limb's reach smoothly, so that a target out of reach is approached and never snapped to."""
+    """Limit a limb's reach smoothly, so that a target out of reach is approached without a jump."""
     reach = _SHORTEST * length + softplus(reach - _SHORTEST * length, 0.03)
     return _LONGEST * length - softplus(_LONGEST * length - reach, 0.010)
 
@@ -54,8 +54,8 @@ def bend(
 ) -> tuple[Vectors, Vectors, Angles]:
     """Bend a limb of two bones so that it leads from ``start`` to ``end``.
 
-    ``pole`` says where the middle joint points; it must not be parallel to the limb. With ``limit`` the reach goes
-    through :func:`soft_reach`; without, the end must be within reach and is met exactly.
+    ``pole`` is the direction in which the middle joint points; it must not be parallel to the limb. With ``limit`` the
+    reach goes through :func:`soft_reach`; without, the end must be within reach and is met exactly.
 
     Returns:
         Unit direction of the upper bone; unit vector across it in the limb's plane, on the side to which the lower
@@ -87,7 +87,7 @@ def arm_rotations(
 
     Args:
         shoulder, wrist: positions in the world, metres.
-        pole: where the elbow points, in the world.
+        pole: direction in which the elbow points, in the world.
         lengths: upper arm and forearm, metres.
         side: +1 left, -1 right.
         hand: supination of the forearm (0 = thumb up where the forearm is level, positive = palm up), palmar flexion
@@ -102,7 +102,7 @@ def arm_rotations(
     world = np.stack([x, np.cross(inner, x), inner], axis=2)
     supination, palmar, radial = hand.T
     hinge = turn(1, -side * flexion)
-    # Thumb up is meant in the world, wherever the elbow points; a hanging forearm has no such direction.
+    # "Thumb up" is a direction in the world, wherever the elbow points; a hanging forearm has none.
     up = (world @ hinge)[:, 1, :]
     upright = np.arctan2(up[:, 1], np.sqrt(up[:, 2] ** 2 + 0.04) + 0.25)
     elbow = hinge @ turn(0, -_limit(supination + upright, _TWIST))

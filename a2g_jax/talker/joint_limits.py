@@ -71,7 +71,7 @@ def joint_angles(motion: Motion) -> dict[tuple[str, str], Angles]:
     """Anatomical angles in degrees by joint and movement, for all limits whose joints the motion has.
 
     Args:
-        motion: on the talker's body, with or without fingers.
+        motion: on the talker's skeleton, with or without fingers.
     """
     local = np.asarray(motion.rotations, dtype=np.float64)
     angles: dict[tuple[str, str], Angles] = {}
@@ -84,7 +84,7 @@ def joint_angles(motion: Motion) -> dict[tuple[str, str], Angles]:
 
 
 def limits_of(motion: Motion) -> tuple[Limit, ...]:
-    """The limits of a motion's joints, both sides, left ones mirrored to the right."""
+    """Limits of a motion's joints on both sides; the right ones mirror the left ones."""
     both = [limit for limit in BODY_LIMITS + FINGER_LIMITS if limit.joint in motion.skeleton.names]
     right = [Limit("R_" + x.joint[2:], x.movement, x.low, x.high) for x in both if x.joint.startswith("L_")]
     return (*both, *right)
@@ -93,7 +93,7 @@ def limits_of(motion: Motion) -> tuple[Limit, ...]:
 def limit_excess(motion: Motion) -> Float[np.ndarray, "T J"]:
     """Degrees by which each joint is beyond its range, the worst movement of each; 0 inside.
 
-    Spine and neck count as wholes: what they do beyond their range is charged to ``Spine3`` and ``Head``.
+    Spine and neck count as wholes: their excess is that of ``Spine3`` and ``Head``.
     """
     angles = joint_angles(motion)
     excess = np.zeros((motion.frames, motion.skeleton.joints))
@@ -144,7 +144,7 @@ def _collar(m: Rotations) -> dict[str, Angles]:
 
 def _shoulder(m: Rotations) -> dict[str, Angles]:
     along, bend = m[:, :, 0], m[:, :, 2]
-    # The shortest turn from a hanging arm, whose elbow bends forward, carries the forward axis to `level`.
+    # The shortest turn from a hanging arm, whose elbow bends forward, takes the forward axis to `level`.
     down = np.array([0.0, -1.0, 0.0])
     cos = along @ down
     axis = np.cross(down, along)

@@ -2,8 +2,8 @@
 
 Syllables are (C)(C)V(C)(C). Function words are short, unstressed and frequent; content words have one to four
 syllables and one lexical stress. Words are used with Zipf's frequencies, and frequent words are shorter (Zipf 1935).
-The lexicon is drawn once from a fixed seed, so a word sounds the same in every recording; a recording has a topic,
-words that come back again and again.
+The lexicon is drawn once from a fixed seed, so a word sounds the same in every recording; a recording has a topic:
+recurring words.
 """
 
 import math
@@ -29,7 +29,7 @@ _TOPIC_DRIFT = 0.2  # chance that a newly mentioned word joins the topic
 
 @dataclass(frozen=True)
 class _Table:
-    """Things to choose from, with their relative frequencies summed up."""
+    """Items with their cumulative relative frequencies."""
 
     items: tuple[str, ...]
     sums: tuple[float, ...]
@@ -76,7 +76,7 @@ class Word:
 
 
 HESITATION = Word("em", (("@", "m"),), -1)
-"""The filled pause: what is said while looking for a word."""
+"""The filled pause."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _spell(syllables: tuple[tuple[str, ...], ...]) -> str:
 def _content_word(rng: np.random.Generator, rarity: float) -> Word:
     shares = (a + rarity * (b - a) for a, b in zip(_SYLLABLES_FREQUENT, _SYLLABLES_RARE, strict=True))
     count = 1 + min(3, bisect(list(accumulate(shares)), rng.random()))
-    # Stress prefers the last but one syllable, as in many languages; never further back than the third from the end.
+    # Mostly the last but one syllable, as in many languages; never further back than the third from the end.
     stress = max(0, count - 1 - bisect((0.25, 0.85), rng.random()))
     syllables = tuple(_syllable(rng, index == stress, index == 0) for index in range(count))
     return Word(_spell(syllables), syllables, stress)
@@ -156,14 +156,14 @@ def _draw(rng: np.random.Generator, words: Sequence[Word]) -> Word:
 
 
 class Topic:
-    """What a recording is about: a few content words that come back, joined now and then by new ones."""
+    """A recording's topic: a few recurring content words, joined occasionally by new ones."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
         self.words = [_draw(rng, lexicon().content[20:]) for _ in range(_TOPIC_WORDS)]
 
     def content_word(self) -> Word:
-        """Draws the next content word, of the topic or not."""
+        """Draw the next content word, of the topic or not."""
         rng = self.rng
         if rng.random() < _ON_TOPIC:
             return _draw(rng, self.words)
@@ -173,7 +173,7 @@ class Topic:
         return word
 
     def group(self) -> tuple[Word, ...]:
-        """Draws a run of zero to two function words and one or two content words, as in "of the old house"."""
+        """Draw zero to two function words and one or two content words, as in "of the old house"."""
         rng = self.rng
         words: list[Word] = []
         for _ in range(bisect((0.2, 0.68), rng.random())):

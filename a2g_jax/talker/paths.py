@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 
 def minimum_jerk(x: Float[np.ndarray, "*any"]) -> Float[np.ndarray, "*any"]:
-    """The minimum-jerk step from 0 to 1 over ``x`` from 0 to 1; constant outside."""
+    """Minimum-jerk step from 0 to 1 over ``x`` from 0 to 1; constant outside."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * x * (10.0 + x * (6.0 * x - 15.0))
 
@@ -31,14 +31,14 @@ def softplus(x: Float[np.ndarray, "*any"], width: float) -> Float[np.ndarray, "*
 def soft_clip(
     values: Float[np.ndarray, "T C"], limits: Float[np.ndarray, "C 2"], width: float
 ) -> Float[np.ndarray, "T C"]:
-    """Channels kept strictly between their ``limits`` (least, most), smoothly; unchanged a few ``width`` inside."""
+    """Channels kept smoothly and strictly between their ``limits`` (least, most); unchanged a few ``width`` inside."""
     low, high = limits.T
     return high - softplus(high - (low + softplus(values - low, width)), width)
 
 
 @dataclass
 class Track:
-    """A path of C channels built from steps and bumps, then sampled at any times."""
+    """A path of C channels, the sum of steps and bumps, that can be sampled at any time."""
 
     start: Float[np.ndarray, " C"]
     """Value before the first step."""
@@ -48,7 +48,7 @@ class Track:
 
     @property
     def goal(self) -> Float[np.ndarray, " C"]:
-        """Where the last step leads."""
+        """Value after the last step."""
         return self.start if self._goal is None else self._goal
 
     def step_to(self, goal: Float[np.ndarray, " C"], begin: float, end: float) -> None:

@@ -1,4 +1,4 @@
-"""The sounds of the invented language: how long they are, how they are articulated, how loud they are.
+"""Phones of the invented language: duration, articulation and level.
 
 Vowel formants are averages of men's vowels in the manner of Peterson & Barney 1952; consonants have an F2 locus and a
 slope of the locus equation F2(onset) = slope * F2(vowel) + (1 - slope) * locus (Sussman, McCaffrey & Matthews 1991).
@@ -8,7 +8,7 @@ Frequencies are for a tract of 17.5 cm; levels are in dB relative to a full open
 from dataclasses import dataclass
 
 SILENT = -48.0
-"""Level of what is not there, dB relative to a full vowel: where fades start and end."""
+"""Level of an absent source, dB relative to a full vowel: where fades start and end."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Phone:
     seconds: float
     """Duration at a neutral rate, unstressed, in the middle of a phrase."""
     elasticity: float
-    """How much of a syllable's stretch it takes up: 1 follows it, 0 keeps its duration."""
+    """Its share in a syllable's stretch: 1 follows it, 0 keeps its duration."""
     targets: tuple[tuple[float, float, float], ...]
     """F1, F2, F3 in Hz; two rows for a diphthong. For consonants F2 is the locus."""
     slope: float = 1.0

@@ -1,4 +1,4 @@
-"""Plans what is said and when: words, syllables, pauses and pitch accents of a recording of a given length."""
+"""Speech plan of a recording: words, syllables, pauses and pitch accents, with their times."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from a2g_jax.errors import InputError
-from a2g_jax.talker.emotions import VOICE_EMOTIONS, VoiceEmotion, shown
+from a2g_jax.talker.emotions import VOICE_EMOTIONS, VoiceEmotion, scaled
 from a2g_jax.talker.language import HESITATION, Topic, Word
 from a2g_jax.talker.phones import PHONES
 from a2g_jax.talker.speakers import SPEAKERS, VoiceStyle
 from a2g_jax.talker.speech import Phrase, PlannedWord, SpeechPlan, Syllable
 
 SHORTEST_RECORDING = 2.0
-"""Seconds; anything shorter has no room for a phrase between its silences."""
+"""Shortest recording, seconds: a phrase between two silences."""
 
 _MEAN_SYLLABLE = 0.187  # seconds at stretch 1 (stress, accents and final lengthening included): anchors the rates
 _SHORTEST_PAUSE = 0.2
@@ -33,7 +33,7 @@ class _Drafted:
     word: Word
     accent: float
     stretches: tuple[float, ...]
-    """What else makes each of its syllables longer (above 1) or shorter."""
+    """Further factor on the duration of each of its syllables."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def _syllable_seconds(symbols: tuple[str, ...], stretch: float) -> float:
 
 
 def _place_peak(syllable: Syllable) -> Syllable:
-    """Puts the energy peak into the vowel: a little before its middle, earlier in lengthened vowels."""
+    """The syllable with its energy peak in the vowel: a little before its middle, earlier in lengthened vowels."""
     start, end = next((a, b) for symbol, a, b in phone_spans(syllable) if PHONES[symbol].is_vowel)
     return replace(syllable, peak=start + min(0.45 * (end - start), 0.085))
 
@@ -92,7 +92,7 @@ def _time_words(words: list[_Drafted], stretch: float, first_word: int) -> tuple
 
 
 class _AccentClock:
-    """Decides which content words carry a strong accent: irregular, about one a second at density 1."""
+    """Choice of the content words with a strong accent: irregular, about one a second at density 1."""
 
     def __init__(self, rng: np.random.Generator, density: float) -> None:
         self.rng = rng
@@ -104,7 +104,7 @@ class _AccentClock:
         self.elapsed += seconds
 
     def accent(self) -> float:
-        """Draws the accent of a content word that is now due: 0, weak (below 0.4) or strong (0.5 and more)."""
+        """Draw the accent of the next content word: 0, weak (below 0.4) or strong (0.5 and more)."""
         rng = self.rng
         if self.elapsed >= self.gap:
             self.elapsed = 0.0
@@ -124,7 +124,7 @@ def _drafted(rng: np.random.Generator, word: Word, accent: float) -> _Drafted:
 def _draft_phrase(
     rng: np.random.Generator, topic: Topic, clock: _AccentClock, seconds: float, stretch: float
 ) -> list[_Drafted]:
-    """Draws words until they last about ``seconds``; now and then the speaker hesitates before a group of words."""
+    """Draw words until they last about ``seconds``, with occasional hesitations before a group of words."""
     words: list[_Drafted] = []
     time = 0.0
     while time < seconds:
@@ -141,7 +141,7 @@ def _draft_phrase(
 
 
 def _fit(words: list[_Drafted], stretch: float, room: float) -> list[_Drafted]:
-    """Drops words from the end until the phrase, its final lengthening included, fits into ``room`` seconds."""
+    """Drop words from the end until the phrase, with its final lengthening, fits into ``room`` seconds."""
     while words and _time_words(words, stretch, 0)[1][-1] > room:
         words = words[:-1]
     while words and words[-1].word is HESITATION:
@@ -150,7 +150,7 @@ def _fit(words: list[_Drafted], stretch: float, room: float) -> list[_Drafted]:
 
 
 def _pause(rng: np.random.Generator, ends_sentence: bool, factor: float) -> float:
-    """A pause's length in seconds: 0.2 to 1.3, rarely up to 2.2; longer at the end of a sentence."""
+    """Draw a pause's length in seconds: 0.2 to 1.3, rarely up to 2.2; longer at the end of a sentence."""
     if rng.random() < 0.05:
         return float(rng.uniform(1.2, 2.2))
     median = 0.68 if ends_sentence else 0.36
@@ -158,7 +158,7 @@ def _pause(rng: np.random.Generator, ends_sentence: bool, factor: float) -> floa
 
 
 def _ending(rng: np.random.Generator) -> str:
-    """How a phrase ends; about half of the phrases go on with their sentence in the next one."""
+    """Draw how a phrase ends; about half of the phrases continue their sentence in the next one."""
     draw = rng.random()
     return "continuation" if draw < 0.5 else "fall" if draw < 0.9 else "question"
 
@@ -172,26 +172,27 @@ def _look_up(speaker: str, emotion: str) -> tuple[VoiceStyle, VoiceEmotion]:
 
 
 def plan_speech(seconds: float, speaker: str, emotion: str, rng: np.random.Generator) -> SpeechPlan:
-    """Plans a recording.
-
-    **Arguments:**
-
-    - `seconds`: length of the recording, at least :data:`SHORTEST_RECORDING`.
-    - `speaker`, `emotion`: names in :data:`SPEAKERS` and :data:`VOICE_EMOTIONS`.
-    - `rng`: the only source of randomness.
+    """Draw the speech plan of a recording.
 
     Phrases last 0.8 to 5.5 s, pauses 0.2 to 1.3 s (one in twenty up to 2.2 s). The recording starts and ends with
-    0.3 to 0.8 s of silence. The last phrase is cut at a word's end, and what is left over lengthens the pauses, or
+    0.3 to 0.8 s of silence. The last phrase is cut at a word's end, and the remaining time lengthens the pauses, or
     the final silence where there is no pause. Recordings of a few seconds may hold one shorter phrase.
 
-    Raises `InputError` for an unknown name or a length that leaves no room for a phrase.
+    Args:
+        seconds: length of the recording, at least :data:`SHORTEST_RECORDING`.
+        speaker: a name in :data:`SPEAKERS`.
+        emotion: a name in :data:`VOICE_EMOTIONS`.
+        rng: the only source of randomness.
+
+    Raises:
+        InputError: unknown speaker or emotion, or too short for a phrase.
     """
     style, mood = _look_up(speaker, emotion)
     if not (math.isfinite(seconds) and seconds >= SHORTEST_RECORDING):
         raise InputError(f"seconds is {seconds}: speech needs at least {SHORTEST_RECORDING:g}")
     strength = float(rng.uniform(*_STRENGTH))
-    mood = shown(mood, strength)
-    # Nobody talks at the same tempo every day.
+    mood = scaled(mood, strength)
+    # A speaker's tempo differs from recording to recording.
     tempo = math.exp(_TEMPO_SPREAD * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
     pausing = style.pause_factor * mood.pause_factor * math.exp(0.12 * rng.standard_normal())
     base_stretch = 1.0 / (_MEAN_SYLLABLE * style.syllable_rate * mood.rate_factor * tempo)
@@ -238,7 +239,7 @@ def plan_speech(seconds: float, speaker: str, emotion: str, rng: np.random.Gener
 
 
 def _assemble(empty: SpeechPlan, limit: float, starts: list[float], drafts: list[_Draft]) -> SpeechPlan:
-    """Puts the drafted phrases on an empty plan's time line; what is left before ``limit`` lengthens the pauses."""
+    """An empty plan filled with the drafted phrases; time left before ``limit`` lengthens the pauses."""
     phrases: list[Phrase] = []
     words: list[PlannedWord] = []
     syllables: list[Syllable] = []

@@ -6,12 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.geometry.skeleton import BODY_JOINTS
-from a2g_jax.talker import skeleton as body
 from a2g_jax.talker.ik import Rotations, Vectors, arm_rotations, leg_rotations, rotate, turn, yaw_roll_pitch
 from a2g_jax.talker.paths import soft_clip, softplus
 from a2g_jax.talker.posture import Stance
 from a2g_jax.talker.reach import clear_hands, wrist_targets
-from a2g_jax.talker.skeleton import TALKER_SKELETON
+from a2g_jax.talker.skeleton import ANKLE_HEIGHT, FOREARM, PELVIS_HEIGHT, SHIN, TALKER_SKELETON, THIGH, UPPER_ARM
 
 _JOINT = {name: index for index, name in enumerate(BODY_JOINTS)}
 _OFFSETS = np.asarray(TALKER_SKELETON.offsets, dtype=np.float64)
@@ -39,14 +38,14 @@ _WRIST_LIMITS = np.deg2rad([[-58.0, 66.0], [-26.0, 17.0]])
 """Least and most palmar flexion and radial deviation."""
 
 
-def pose_body(
+def joint_rotations(
     channels: Float[np.ndarray, "T 12"],
     breath: Float[np.ndarray, " T"],
     controls: dict[str, Float[np.ndarray, "T 9"]],
     stance: Stance,
     over: float,
 ) -> tuple[Float[np.ndarray, "T J 3 3"], Vectors]:
-    """Local rotations and root path.
+    """Local rotations of the 22 joints, and the path of the root in metres.
 
     Args:
         channels, breath, stance: of :class:`~a2g_jax.talker.posture.PosturePlan`.
@@ -60,7 +59,7 @@ def pose_body(
     local = np.tile(np.eye(3), (count, len(BODY_JOINTS), 1, 1))
     pelvis_turn = yaw_roll_pitch(*channels[:, 3:6].T)
     local[:, 0] = pelvis_turn
-    root = np.array([0.0, body.PELVIS_HEIGHT, 0.0]) + channels[:, :3]
+    root = np.array([0.0, PELVIS_HEIGHT, 0.0]) + channels[:, :3]
     root[:, 1] = _stand(root, pelvis_turn, stance)
     _pose_legs(local, root, pelvis_turn, stance)
 
@@ -87,17 +86,17 @@ def pose_body(
 
 
 def _ankle(stance: Stance, side: float) -> Float[np.ndarray, " 3"]:
-    return np.array([side * stance.lateral, body.ANKLE_HEIGHT, 0.5 * side * stance.stagger])
+    return np.array([side * stance.lateral, ANKLE_HEIGHT, 0.5 * side * stance.stagger])
 
 
 def _stand(root: Vectors, pelvis_turn: Rotations, stance: Stance) -> Float[np.ndarray, " T"]:
-    """Pelvis height: as asked, but never higher than the straighter leg allows."""
+    """Pelvis height: as planned, but never higher than the straighter leg allows."""
     height = root[:, 1]
     for side, name in ((1.0, "L_Hip"), (-1.0, "R_Hip")):
         hip = rotate(pelvis_turn, _OFFSETS[_JOINT[name]])
         away = _ankle(stance, side) - root - hip
-        limit = np.sqrt((0.995 * (body.THIGH + body.SHIN)) ** 2 - away[:, 0] ** 2 - away[:, 2] ** 2)
-        limit = limit + body.ANKLE_HEIGHT - hip[:, 1]
+        limit = np.sqrt((0.995 * (THIGH + SHIN)) ** 2 - away[:, 0] ** 2 - away[:, 2] ** 2)
+        limit = limit + ANKLE_HEIGHT - hip[:, 1]
         height = limit - softplus(limit - height, 0.006)
     return height
 
@@ -108,7 +107,7 @@ def _pose_legs(local: Float[np.ndarray, "T J 3 3"], root: Vectors, pelvis_turn: 
         foot = turn(1, np.array([side * stance.toe_out[0 if side > 0 else 1]]))
         forward = np.broadcast_to(foot[0, :, 2], hip.shape)
         ankle = np.broadcast_to(_ankle(stance, side), hip.shape)
-        thigh, knee = leg_rotations(hip, ankle, forward, (body.THIGH, body.SHIN))
+        thigh, knee = leg_rotations(hip, ankle, forward, (THIGH, SHIN))
         local[:, _JOINT[f"{letter}_Hip"]] = np.swapaxes(pelvis_turn, 1, 2) @ thigh
         local[:, _JOINT[f"{letter}_Knee"]] = knee
         local[:, _JOINT[f"{letter}_Ankle"]] = np.swapaxes(thigh @ knee, 1, 2) @ foot
@@ -153,11 +152,11 @@ def _solve_arm(
     pole[:, 2] = -0.15 - 0.35 * (1.0 + np.tanh((same_way - 0.74) / 0.2))
     angles = np.concatenate([control[:, 3:4], soft_clip(control[:, 4:6], _WRIST_LIMITS, 0.08)], axis=1)
     upper, elbow, wrist = arm_rotations(
-        shoulder, target, rotate(trunk.facing, pole), (body.UPPER_ARM, body.FOREARM), side, angles
+        shoulder, target, rotate(trunk.facing, pole), (UPPER_ARM, FOREARM), side, angles
     )
     forearm = upper @ elbow
     along = np.array([side, 0.0, 0.0])
-    place = shoulder + rotate(upper, body.UPPER_ARM * along) + rotate(forearm, body.FOREARM * along)
+    place = shoulder + rotate(upper, UPPER_ARM * along) + rotate(forearm, FOREARM * along)
     names = [f"{letter}_{part}" for part in ("Collar", "Shoulder", "Elbow", "Wrist")]
     rotations = [collar, np.swapaxes(collar_turn, 1, 2) @ upper, elbow, wrist]
     return _ArmPose(dict(zip(names, rotations, strict=True)), place, forearm @ wrist)

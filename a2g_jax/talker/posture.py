@@ -1,4 +1,4 @@
-"""Torso, head and pelvis over time: posture, sway, breathing, gaze, nods, and what the arms' work does to them."""
+"""Torso, head and pelvis over time: posture, sway, breathing, gaze, nods, and reactions to the arms' movement."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ CHANNELS = 12
 """Pelvis x, y, z (metres); yaw, roll, pitch (radians) of pelvis, chest over pelvis, head over chest."""
 _PELVIS, _PELVIS_TURN, _CHEST, _HEAD = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 _KNEE_EASE = 0.007
-"""Standing at ease lowers the pelvis by this much, metres."""
+"""Height that the pelvis loses in a relaxed stance, metres."""
 NOD_SPACING = 0.5
 """Smallest time between nods, seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """Where the feet stand for the whole recording."""
+    """Positions of the feet, fixed for a recording."""
 
     lateral: float
     """Ankles' distance from the midline, metres."""
@@ -33,7 +33,7 @@ class Stance:
 
 @dataclass(frozen=True, eq=False)
 class PosturePlan:
-    """Everything needed to sample the posture at any time."""
+    """The posture of a recording, which can be sampled at any time."""
 
     stance: Stance
     track: Track
@@ -83,7 +83,7 @@ def _move(track: Track, change: dict[int, float], begin: float, end: float) -> N
 
 
 def _shift_weight(track: Track, seconds: float, posture: str, style: GestureStyle, rng: np.random.Generator) -> None:
-    """The pelvis moves over one foot, the hip over the loaded leg rises, the chest bends back over the feet."""
+    """Move the pelvis over one foot: the hip over the loaded leg rises, the chest bends back over the feet."""
     home = {"even": 0.0, "left": 0.03, "right": -0.03}[posture]
     base = track.start.copy()
 
@@ -111,7 +111,7 @@ def _shift_weight(track: Track, seconds: float, posture: str, style: GestureStyl
 
 
 def _shift_gaze(track: Track, seconds: float, style: GestureStyle, rng: np.random.Generator) -> None:
-    """The head turns to another listener every few seconds; the chest follows later and less."""
+    """Turn the head to another listener every few seconds; the chest follows later and less."""
     level, follow = track.start[11], track.start.copy()
     yaw = np.deg2rad(rng.normal(0.0, 0.6 * style.gaze))
     track.start[9] += 0.8 * yaw
@@ -127,7 +127,7 @@ def _shift_gaze(track: Track, seconds: float, style: GestureStyle, rng: np.rando
 
 
 def _nod(track: Track, plan: SpeechPlan, style: GestureStyle, rng: np.random.Generator) -> None:
-    """A nod on accents: time and size follow the audio, its shape varies a little."""
+    """Nod on accents: time and size follow the audio, the shape varies a little."""
     threshold = max(0.12, style.threshold - 0.15)
     for index in accented_syllables(plan, threshold, NOD_SPACING):
         syllable = plan.syllables[index]
@@ -146,7 +146,7 @@ def _nod(track: Track, plan: SpeechPlan, style: GestureStyle, rng: np.random.Gen
 
 
 def _follow_arms(track: Track, draws: GestureDraws, style: GestureStyle, rng: np.random.Generator) -> None:
-    """Torso and head turn a little toward the working hand, and each stroke is felt in the trunk."""
+    """Turn torso and head a little toward the gesturing hand, and move the trunk a little with each stroke."""
     for unit in draws.units:
         strokes = [draws.strokes[index] for index in unit.strokes]
         side = {"left": 1.0, "right": -1.0, "both": 0.0}[unit.hand]

@@ -28,8 +28,8 @@ ACCENT_DB = (0.0, 8.5)
 
 _TURNS = {"fall": -0.55, "continuation": 0.22, "question": 0.75}  # of the range, over the last 0.35 s
 _NEPER_PER_SEMITONE = math.log(2.0) / 12.0
-_WANDER = 0.08  # of the range: what no command explains
-_SYLLABLE_DB, _PHRASE_DB = 1.3, 2.0  # standard deviations of what no accent explains
+_WANDER = 0.08  # of the range: standard deviation of slow noise beside the commands
+_SYLLABLE_DB, _PHRASE_DB = 1.3, 2.0  # standard deviations of the variation beside the accents
 _PHRASE_LEAD = 0.25  # seconds by which a phrase command precedes the phrase
 
 
@@ -54,12 +54,12 @@ def _between(times: Float[np.ndarray, " T"], start: float, end: float) -> slice:
 def _phrase_curve(
     plan: SpeechPlan, reach: float, times: Float[np.ndarray, " T"], rng: np.random.Generator
 ) -> Float[np.ndarray, " T"]:
-    """Phrase components of ln F0, reset at each phrase, most at a sentence's start; a fall or rise at its end."""
+    """Phrase components of ln F0: reset at each phrase, most at a sentence's start; a fall or rise at its end."""
     curve = np.zeros(len(times))
-    goes_on = False
+    continues = False
     for phrase in plan.phrases:
-        size = (0.62 if goes_on else 0.85) * reach * math.exp(0.15 * rng.standard_normal())
-        goes_on = phrase.ending == "continuation"
+        size = (0.62 if continues else 0.85) * reach * math.exp(0.15 * rng.standard_normal())
+        continues = phrase.ending == "continuation"
         commands = [(phrase.start - _PHRASE_LEAD, size)]
         # Further, smaller commands keep long phrases from falling to the floor half way.
         commands += [(phrase.start + t, 0.45 * size) for t in np.arange(1.4, phrase.end - phrase.start - 0.8, 1.6)]
@@ -129,10 +129,10 @@ def pitch_contour(
     base = math.log(style.median_f0_hz) + emotion.f0_shift_semitones * _NEPER_PER_SEMITONE
     if spoken.any():
         log_f0 -= np.median(log_f0[spoken])
-    # Even excited voices seldom leave the octave above their median: bend what lies beyond 10 semitones.
+    # Even excited voices seldom leave the octave above their median: compress values beyond 10 semitones.
     knee = 10.0 * _NEPER_PER_SEMITONE
     log_f0 = np.where(log_f0 > knee, knee + 0.3 * np.tanh((log_f0 - knee) / 0.3), log_f0) + base
-    # Slow wander that no command explains: "flutter" as three incommensurate sinusoids (Klatt & Klatt 1990).
+    # Slow variation beside the commands: "flutter" as three incommensurate sinusoids (Klatt & Klatt 1990).
     for rate in (12.7, 7.1, 4.7):
         log_f0 += 0.002 * emotion.jitter_factor * np.sin(2.0 * math.pi * (rate * times + rng.random()))
     return np.exp(log_f0)
@@ -141,7 +141,7 @@ def pitch_contour(
 def creak_contour(
     plan: SpeechPlan, times: Float[np.ndarray, " T"], rng: np.random.Generator
 ) -> Float[np.ndarray, " T"]:
-    """How creaky the voice is, 0 to 1: half of the falling phrases end in creak (irregular pulses at half the rate)."""
+    """Creakiness of the voice, 0 to 1: half of the falling phrases end in creak (irregular pulses at half the rate)."""
     curve = np.zeros(len(times))
     for phrase in plan.phrases:
         length = rng.uniform(0.08, 0.22)
@@ -157,8 +157,8 @@ def energy_contour(
     """Level in dB relative to an unaccented stressed vowel, at the given times; peaks at every syllable's peak."""
     peaks = [syllable.peak for syllable in plan.syllables]
     chance = _SYLLABLE_DB * rng.standard_normal(len(peaks))
-    own = [dB + (0.0 if s.stress else -1.5) for s, dB in zip(plan.syllables, chance.tolist(), strict=True)]
-    level = np.interp(times, peaks, own)
+    levels = [dB + (0.0 if s.stress else -1.5) for s, dB in zip(plan.syllables, chance.tolist(), strict=True)]
+    level = np.interp(times, peaks, levels)
     for phrase in plan.phrases:
         part = _between(times, phrase.start, phrase.end)
         share = (times[part] - phrase.start) / (phrase.end - phrase.start)
@@ -167,7 +167,7 @@ def energy_contour(
         level[part] -= 6.0 * ((times[part] - phrase.end + 0.2) / 0.2) ** 2
     for syllable in plan.syllables:
         peak = syllable.peak
-        # Every syllable is a hill of its own.
+        # Every syllable has a maximum of its own.
         half = max(peak - syllable.onset, syllable.end - peak)
         part = _between(times, syllable.onset, syllable.end)
         level[part] -= 10.0 * np.minimum(((times[part] - peak) / half) ** 2, 1.0)

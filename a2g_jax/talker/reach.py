@@ -1,4 +1,4 @@
-"""Wrist targets in the world: carried by the chest, kept out of the torso and clear of each other."""
+"""Wrist targets in the world: they move with the chest and stay clear of the torso and of each other."""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,7 @@ _CLEARANCE = 0.085
 _HANDS_APART = 0.045
 """Least distance between the middle lines of the hands, metres: two hands' thickness."""
 _NEARNESS = 0.025
-"""Distances that differ by this much, metres, count about the same."""
+"""Width of the smooth minimum over distances, metres."""
 _HAND_POINTS = (0.1, 0.55, 1.0)
 """Points of a hand that are kept clear, as shares of its length."""
 
@@ -42,7 +42,7 @@ def wrist_targets(
 def clear_hands(
     hands: dict[str, tuple[Vectors, Rotations]], pelvis: Vectors, neck: Vectors, facing: Rotations, over: float
 ) -> dict[str, Vectors]:
-    """How far both wrists have to move for palms and fingers to clear the torso and each other.
+    """Displacements of both wrists that keep palms and fingers clear of the torso and of each other.
 
     Args:
         hands: wrist position and the hand's axes in the world, by hand.
@@ -64,7 +64,7 @@ def clear_hands(
     # The smooth minimum is never more than the least distance.
     distance = nearest - _NEARNESS * np.log(np.sum(nearness, axis=0))
     weights = nearness / np.sum(nearness, axis=0)
-    # Along what lies between them; where they cross, one hand passes over the other. No direction turns at once.
+    # Along the line between them; where they cross, one hand passes over the other. Directions change smoothly.
     away = np.einsum("pt,pti->ti", weights, gaps) + rotate(facing, np.array([0.01, 0.025 * over, 0.06 * over]))
     away /= np.sqrt(np.sum(away**2, axis=1, keepdims=True) + 0.03**2)
     push = 0.6 * softplus(_HANDS_APART - distance, 0.042)[:, None] * away

@@ -1,4 +1,4 @@
-"""Whole recordings of the generated corpus: a plan, its voice, and one of its many right motions."""
+"""Whole recordings of the generated corpus: a speech plan, its audio, and one of its many valid motions."""
 
 import zlib
 from dataclasses import asdict
@@ -22,7 +22,7 @@ from a2g_jax.talker.voice import synthesise
 
 #: Length of one recording of a corpus, seconds.
 RECORDING_SECONDS = 60.0
-# What a recording's seed is split into; new uses get new numbers, so that old seeds keep their meaning.
+# Streams of a recording's seed; new uses get new numbers, so that old seeds keep their meaning.
 _SPEECH, _VOICE, _MOTION, _CAST, _ROOM = range(5)
 
 
@@ -38,18 +38,18 @@ def talk(
     room: bool = False,
     fingers: bool = False,
 ) -> Recording:
-    """Generate one recording: someone says something in an invented language, and gestures.
+    """Generate one recording: speech in an invented language, with gestures.
 
     The same arguments always give the same recording. ``annotations`` holds the speech plan under ``"speech"`` and the
-    truth about the motion under ``"gestures"``.
+    ground truth of the motion under ``"gestures"``.
 
     Args:
         seconds: length, 2 or more.
-        seed: of everything that is drawn.
+        seed: of everything random.
         speaker: one of :data:`~a2g_jax.talker.speakers.SPEAKERS`.
         emotion: one of :data:`~a2g_jax.talker.emotions.VOICE_EMOTIONS`.
-        room: as heard by some microphone in some room, with noise, instead of clean.
-        fingers: move on the skeleton with finger joints; the body moves the same without.
+        room: as recorded by a random microphone in a random room with noise, instead of clean.
+        fingers: use the skeleton with finger joints; the other joints move the same without.
 
     Raises:
         InputError: unknown speaker or emotion, or too short.
@@ -57,7 +57,7 @@ def talk(
     for kind, value, known in (("speaker", speaker, SPEAKERS), ("emotion", emotion, VOICE_EMOTIONS)):
         if value not in known:
             raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
-    # One seed makes different people say different things, in different moods too.
+    # With one seed, different speakers say different things, and so do different emotions.
     role = zlib.crc32(f"{speaker}/{emotion}".encode())
     plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
     motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps, fingers)
@@ -77,9 +77,9 @@ def talk(
 
 
 def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTruth]:
-    """Another right motion for the same audio: everything that the audio leaves open is drawn anew.
+    """Another valid motion for the same audio: everything that the audio does not determine is drawn again.
 
-    This is a draw from the true conditional distribution that a model of the corpus should learn. It has fingers if the
+    A sample of the true conditional distribution that a model of the corpus should learn. It has fingers if the
     recording's motion has them.
 
     Args:
@@ -114,28 +114,28 @@ def plan_from_json(value: dict[str, Any]) -> SpeechPlan:
 def cast(
     minutes: float, seed: int, speakers: tuple[str, ...] = (), emotions: tuple[str, ...] = ()
 ) -> list[dict[str, Any]]:
-    """Who says what in a corpus: arguments of :func:`talk` for each recording of a minute (the last may be shorter).
+    """Speakers, emotions and seeds of a corpus: arguments of :func:`talk` for each recording, about a minute each.
 
-    Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording is
-    heard in a room, so that models trained on the corpus also hear speech that was not recorded in a studio.
+    Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording has
+    the sound of a room, so that models trained on the corpus are not limited to studio recordings.
     """
-    known_speakers, known_emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
+    speakers, emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
     total = minutes * 60.0
     if total < 10.0:
-        raise InputError(f"{minutes} minutes of talk are too few; ask for 0.2 or more.")
+        raise InputError(f"{minutes} minutes of talk are too few; use 0.2 or more.")
     count = max(1, round(total / RECORDING_SECONDS))
     rng = np.random.default_rng([seed, _CAST])
     roles = []
     for index in range(count):
-        if index % len(known_speakers) == 0:
-            order = rng.permutation(len(known_speakers))
-        neutral = "neutral" in known_emotions and rng.random() < 0.5
+        if index % len(speakers) == 0:
+            order = rng.permutation(len(speakers))
+        neutral = "neutral" in emotions and rng.random() < 0.5
         roles.append(
             {
                 "seconds": total / count,
                 "seed": int(rng.integers(2**31)),
-                "speaker": known_speakers[order[index % len(known_speakers)]],
-                "emotion": "neutral" if neutral else str(rng.choice(known_emotions)),
+                "speaker": speakers[order[index % len(speakers)]],
+                "emotion": "neutral" if neutral else str(rng.choice(emotions)),
                 "name": f"{index:04d}",
                 "room": index % 2 == 1,
             }

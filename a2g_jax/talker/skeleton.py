@@ -1,4 +1,4 @@
-"""The body that moves: an adult of 1.70 m on the 22 SMPL-X body joints, in metres."""
+"""The talker's skeleton: an adult of 1.70 m with the 22 SMPL-X body joints, in metres."""
 
 import numpy as np
 
@@ -70,7 +70,7 @@ TALKER_SKELETON = Skeleton(
 """Rest skeleton, T-pose along +-X, feet on y = 0 when the pelvis is at :data:`PELVIS_HEIGHT`.
 
 Wrist to wrist 1.364 m, finger tips 1.73 m apart stretched: an adult's proportions. (The 1.2064 m of the
-Audio2Gestures papers is the length by which they scale position errors, not a body's.)
+Audio2Gestures papers is the length by which they scale position errors, not that of a person.)
 The head's end is the crown (1.70 m), the wrists' ends are finger tips, the feet's ends are toes.
 """
 
@@ -103,7 +103,7 @@ def _hands_skeleton() -> Skeleton:
 
 
 TALKER_HANDS_SKELETON = _hands_skeleton()
-"""The same body with 15 finger joints a hand, in SMPL-X order: 52 joints, T-pose, palms down, finger tips as ends.
+"""The same skeleton with 15 finger joints a hand, in SMPL-X order: 52 joints, T-pose, palms down, finger tips as ends.
 
-A stretched hand is 0.185 m long, 10.9 % of the body's height (Winter 2009: 10.8 %).
+A stretched hand is 0.185 m long, 10.9 % of the height (Winter 2009: 10.8 %).
 """

@@ -1,4 +1,4 @@
-"""The voices of the generated corpus; the same six names carry a gesture style in the gesture modules."""
+"""Voices of the generated corpus; :mod:`a2g_jax.talker.styles` has the gesture styles of the same six speakers."""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class VoiceStyle:
-    """How one speaker sounds when neutral."""
+    """The neutral voice of one speaker."""
 
     name: str
     median_f0_hz: float
@@ -50,10 +50,10 @@ SPEAKERS: dict[str, VoiceStyle] = {
 
 
 def session_voice(style: VoiceStyle, rng: np.random.Generator) -> VoiceStyle:
-    """The speaker on one occasion: voices change from day to day, with health, distance to the microphone and mood.
+    """The speaker's voice in one session: it varies from day to day with health, distance to the microphone and mood.
 
     Sizes are a choice: F0 varies by 0.7 semitones (standard deviation), its range by 10 %, level by 1.5 dB, tilt by
-    0.5 dB/octave, breathiness by 1.5 dB, and the tract, which lips and larynx lengthen, by 1.2 %. Tempo is the plan's.
+    0.5 dB/octave, breathiness by 1.5 dB, and the tract, which lips and larynx lengthen, by 1.2 %. Tempo is in the plan.
     """
     pitch, reach, level, tilt, breath, tract = rng.standard_normal(6).clip(-2.0, 2.0).tolist()
     return replace(

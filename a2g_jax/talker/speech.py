@@ -1,13 +1,13 @@
-"""What is said: the plan that both the voice and the gestures of the generated corpus follow.
+"""The speech plan, which both the voice and the gestures of the generated corpus follow.
 
-The plan is everything that audio determines. The voice renders it; gestures take their timing and strength from it,
-and draw everything else (see :mod:`a2g_jax.talker.truth`) from their own key.
+It is everything that the audio determines. Gestures take their timing and size from it; everything else (see
+:mod:`a2g_jax.talker.truth`) is drawn from a stream of its own.
 """
 
 from dataclasses import dataclass
 
 ENDINGS = ("fall", "continuation", "question")
-"""How the melody of a phrase ends: a final fall, a small rise that says there is more to come, or a high rise."""
+"""How the melody of a phrase ends: a final fall, a small rise before more of the sentence, or a high rise."""
 
 
 @dataclass(frozen=True)
@@ -17,13 +17,13 @@ class Syllable:
     onset: float
     """Where its first consonant starts (or its vowel, if it has none)."""
     peak: float
-    """Where its energy is largest: the moment gestures are timed against."""
+    """Where its energy is largest: the reference for the times of gestures."""
     end: float
     phones: tuple[str, ...]
     stress: int
     """0 unstressed, 1 lexically stressed."""
     accent: float
-    """Prominence of its pitch accent, 0 (none) to 1 (emphatic): decides whether a stroke falls here, and how large."""
+    """Prominence of its pitch accent, 0 (none) to 1 (emphatic): determines whether there is a stroke, and its size."""
     word: int
     """Index into :attr:`SpeechPlan.words`."""
 
@@ -46,7 +46,7 @@ class Phrase:
     start: float
     end: float
     ending: str = "fall"
-    """One of :data:`ENDINGS`; only a continuation goes on with the same sentence."""
+    """One of :data:`ENDINGS`; the next phrase belongs to the same sentence only after a continuation."""
 
 
 @dataclass(frozen=True)
@@ -63,4 +63,4 @@ class SpeechPlan:
     words: tuple[PlannedWord, ...]
     syllables: tuple[Syllable, ...]
     strength: float = 1.0
-    """How strongly the emotion shows in the voice: multiplies its deviation from neutral."""
+    """Strength of the emotion in the voice: multiplies the deviation from neutral."""

@@ -1,4 +1,4 @@
-"""How each invented speaker gestures, and what emotions do to it."""
+"""Gesture styles of the six invented speakers, and their changes by emotion."""
 
 from dataclasses import dataclass, replace
 
@@ -56,12 +56,12 @@ class GestureStyle:
     head_pitch: float = 0.0
     """Head bowed forward, degrees."""
     tension: float = 0.0
-    """0 relaxed to 1 tense: lifted shoulders, stiff wrists, little relaxing between strokes."""
+    """0 relaxed to 1 tense: lifted shoulders, stiff wrists, little relaxation between strokes."""
 
 
 @dataclass(frozen=True)
 class EmotionStyle:
-    """What an emotion does to a :class:`GestureStyle`."""
+    """Changes of a :class:`GestureStyle` by an emotion."""
 
     extent: float = 1.0
     """Factor on stroke paths."""
@@ -156,7 +156,7 @@ EMOTION_STYLES: dict[str, EmotionStyle] = {
         gaze=1.3, sway=0.8,
     ),
 }  # fmt: skip
-"""What each emotion changes, by name.
+"""Changes by name of the emotion.
 
 The directions (sadness: small, slow, head bowed; anger and happiness: large and fast; anger: leaning forward; disgust
 and fear: drawing back, arms close) follow the body movement literature: Wallbott 1998, "Bodily expression of emotion",
@@ -168,7 +168,7 @@ def gesture_style(speaker: str, emotion: str) -> GestureStyle:
     """The style of ``speaker`` in ``emotion``.
 
     Raises:
-        InputError: for an unknown name; the message lists the known ones.
+        InputError: unknown name; the message lists those that exist.
     """
     if speaker not in SPEAKER_STYLES:
         raise InputError(f"speaker {speaker!r}: not known; choose one of {', '.join(SPEAKER_STYLES)}")

@@ -19,7 +19,7 @@ _UPPER_WIDTH_HZ = (200.0, 260.0, 350.0, 450.0, 550.0)
 def resonance(
     frequency: Float[np.ndarray, " F"], centre: Float[np.ndarray, " P"], width: Float[np.ndarray, " P"]
 ) -> Complex[np.ndarray, "P F"]:
-    """Denominator of a resonator (the response of an antiresonator); all in Hz."""
+    """Denominator of a resonator, which is the response of an antiresonator; all arguments in Hz."""
     ratio = frequency[None, :] / centre[:, None]
     response = np.empty(ratio.shape, np.complex64)
     response.real = 1.0 - ratio * ratio
@@ -33,12 +33,12 @@ def upper_formants(frequency: Float[np.ndarray, " F"], tract_length: float) -> C
     width = np.array(_UPPER_WIDTH_HZ, np.float32)
     # Stands for the poles above F8, whose skirts lift what lies below them (Fant's higher-pole correction).
     lift = 10.0 ** (_HIGHER_POLES_DB * (np.minimum(frequency, 8000.0) * tract_length / 4000.0) ** 2 / 20.0)
-    known = np.minimum(frequency, _TOP_HZ / tract_length)
-    response = lift / resonance(known.astype(np.float32), centre, width).prod(axis=0)
+    modelled = np.minimum(frequency, _TOP_HZ / tract_length)
+    response = lift / resonance(modelled.astype(np.float32), centre, width).prod(axis=0)
     above = frequency > _TOP_HZ / tract_length
     if above.any():
         ratio = frequency[above] * np.float32(tract_length / _TOP_HZ)
-        # F1 to F3 go on falling by 36 dB/octave up there; the poles beyond F8 make up for it and add ripples.
+        # F1 to F3 fall by 36 dB/octave above it; the poles beyond F8 compensate for that and add ripples.
         ripple = 10.0 ** (_RIPPLE_DB / 20.0 * np.sin(np.pi * (ratio - 1.0) * _TOP_HZ / 1000.0) ** 2)
         response[above] *= ratio ** (6.0 + _TOP_SLOPE_DB / (20.0 * np.log10(2.0))) * ripple
     return response

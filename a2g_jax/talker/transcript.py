@@ -11,16 +11,16 @@ def word_tier(plan: SpeechPlan) -> tuple[Word, ...]:
 
 
 def speech_tiers(plan: SpeechPlan) -> dict[str, tuple[Word, ...]]:
-    """What is finer or coarser than words, as further tiers for :func:`a2g_jax.io.textgrid.write_words`.
+    """Tiers above and below the words, for :func:`a2g_jax.io.textgrid.write_words`.
 
     - ``phrases``: how each breath group's melody ends (``fall``, ``continuation`` or ``question``).
     - ``syllables``: phone symbols joined by dots, after a ``'`` where the lexical stress lies.
     - ``phones``: symbols of :data:`~a2g_jax.talker.phones.PHONES`.
     - ``accents``: prominence of the syllables that carry a pitch accent, 0 to 1 with two decimals.
 
-    Times are seconds, in order and without overlap; neighbours that touch share the very same number.
+    Times are seconds, in order and without overlap; neighbours that touch share exactly the same number.
     """
-    # Sums along different ways differ in their last bits; a shared boundary is taken from where the next one starts.
+    # Sums in different orders differ in their last bits: a shared boundary is where the next interval starts.
     onsets = [syllable.onset for syllable in plan.syllables]
     following = [*onsets[1:], plan.seconds]
     ends = [min(syllable.end, after) for syllable, after in zip(plan.syllables, following, strict=True)]

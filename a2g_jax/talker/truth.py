@@ -1,4 +1,4 @@
-"""What is done: the hidden choices behind a generated motion."""
+"""Ground truth of a generated motion: the hidden choices behind it."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ class Stroke:
     """One gesture stroke; times in seconds."""
 
     apex: float
-    """When the stroke arrives: its wrist speed has just peaked; shortly before or at a syllable's peak."""
+    """When the stroke arrives, just after its peak of wrist speed; at or shortly before a syllable's peak."""
     syllable: int
     """Index of the accented syllable it belongs to. Determined by the audio."""
     size: float
@@ -16,16 +16,16 @@ class Stroke:
     hand: str
     """'left', 'right' or 'both'. Hidden: drawn per gesture unit."""
     family: str
-    """'beat', 'offer', 'sweep', 'point', 'list' or 'frame'. Hidden: the unit's, or now and then another one."""
+    """'beat', 'offer', 'sweep', 'point', 'list' or 'frame'. Hidden: the unit's, or occasionally another one."""
     hold: float
     """Post-stroke hold in seconds, where the next movement leaves room for it. Hidden."""
     unit: int
-    """Index of the gesture unit (from leaving rest to coming back to it)."""
+    """Index of the gesture unit (from leaving rest to returning to it)."""
 
 
 @dataclass(frozen=True)
 class GestureUnit:
-    """One gesture unit: the strokes between leaving rest and coming back to it, and what was drawn for them."""
+    """One gesture unit: the strokes between leaving rest and returning to it, and their hidden choices."""
 
     strokes: tuple[int, ...]
     """Indices into :attr:`GestureTruth.strokes`. Determined by the audio."""
@@ -53,7 +53,7 @@ class PhaseSpan:
 
 @dataclass(frozen=True)
 class GestureTruth:
-    """Everything that was drawn for one motion, and its log-probability."""
+    """All hidden choices of one motion, and their log-probability."""
 
     strokes: tuple[Stroke, ...]
     phases: tuple[PhaseSpan, ...]

@@ -1,8 +1,8 @@
-"""Renders a plan as audio with a source-filter voice.
+"""Source-filter synthesis of a speech plan.
 
 Voiced sound is one impulse response per glottal pulse (source spectrum times vocal tract), overlap-added at jittered
-pulse times; aspiration and frication are noise shaped frame by frame. Every pulse and frame is scaled to the level the
-plan asks for, so loudness is designed, not a by-product of formants: a syllable's energy peaks where the plan says.
+pulse times; aspiration and frication are noise shaped frame by frame. Every pulse and frame is scaled to its planned
+level, so loudness does not depend on the formants: a syllable's energy peaks at its planned time.
 """
 
 import math
@@ -15,7 +15,7 @@ from scipy import fft
 
 from a2g_jax.errors import InputError
 from a2g_jax.talker.articulation import SILENT, TRACK_RATE, Tracks, articulate
-from a2g_jax.talker.emotions import VOICE_EMOTIONS, VoiceEmotion, shown
+from a2g_jax.talker.emotions import VOICE_EMOTIONS, VoiceEmotion, scaled
 from a2g_jax.talker.prosody import creak_contour, energy_contour, pitch_contour
 from a2g_jax.talker.speakers import SPEAKERS, VoiceStyle, session_voice
 from a2g_jax.talker.speech import SpeechPlan
@@ -32,7 +32,7 @@ _CHUNK = 512  # pulses or frames at a time: their spectra stay in the processor'
 _AUDIBLE_DB = SILENT + 1.0
 _LEVEL_SECONDS = 0.04
 _BREATH_DBFS = -43.0
-_REFERENCE_HZ = 8000.0  # levels count what lies below, so that they do not depend on the sample rate
+_REFERENCE_HZ = 8000.0  # levels are of the band below it, so that they do not depend on the sample rate
 _CREAK_F0, _CREAK_JITTER, _CREAK_DB = 0.55, 0.07, 2.0
 
 
@@ -63,7 +63,7 @@ def _band_power(spectrum: np.ndarray, grid: _Grid) -> Float[np.ndarray, " P"]:
 
 
 class _Renderer:
-    """The pieces of one rendering that several sources share."""
+    """State of one rendering that several sources share."""
 
     def __init__(
         self, tracks: Tracks, level: np.ndarray, style: VoiceStyle, emotion: VoiceEmotion, grid: _Grid
@@ -84,7 +84,7 @@ class _Renderer:
     def voiced(
         self, out: np.ndarray, f0: np.ndarray, phase: np.ndarray, creak: np.ndarray, rng: np.random.Generator
     ) -> None:
-        """Adds glottal pulses to ``out``."""
+        """Add glottal pulses to ``out``."""
         style, emotion, grid = self.style, self.emotion, self.grid
         times = np.interp(np.arange(1.0, math.floor(phase[-1])), phase, self.tracks.times)
         pitch = self.at(f0, times)
@@ -126,7 +126,7 @@ class _Renderer:
         spectrum_of: Callable[[np.ndarray], np.ndarray],
         rng: np.random.Generator,
     ) -> None:
-        """Adds noise of unit power, shaped by ``spectrum_of(times)`` at the given frames, times ``amplitude``."""
+        """Add noise of unit power, shaped by ``spectrum_of(times)`` at the given frames, times ``amplitude``."""
         grid = self.grid
         length = 2 * hop
         window = np.sqrt(np.hanning(length + 1)[:-1]).astype(np.float32)
@@ -142,7 +142,7 @@ class _Renderer:
 
 
 def _overlap_add(out: np.ndarray, blocks: Float[np.ndarray, "P N"], starts: np.ndarray) -> None:
-    """Adds each block to ``out`` at its start; what falls outside is dropped."""
+    """Add each block to ``out`` at its start; samples outside are dropped."""
     blocks = blocks.astype(np.float32, copy=False)
     low, high = int(starts.min()), int(starts.max()) + blocks.shape[1]
     index = (starts - low)[:, None] + np.arange(blocks.shape[1])
@@ -196,7 +196,7 @@ def _room(count: int, sample_rate: int, rng: np.random.Generator) -> Float[np.nd
 
 
 def _limit(audio: np.ndarray) -> np.ndarray:
-    """Bends peaks above 0.7 so that they stay below 0.99."""
+    """Compress peaks above 0.7 so that they stay below 0.99."""
     over = np.abs(audio) > 0.7
     audio[over] = np.sign(audio[over]) * (0.7 + 0.29 * np.tanh((np.abs(audio[over]) - 0.7) / 0.29))
     return audio
@@ -209,18 +209,20 @@ def _active_rms(audio: np.ndarray, plan: SpeechPlan, sample_rate: int) -> float:
 
 
 def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16000) -> Float[np.ndarray, " N"]:
-    """Renders a plan: float32, round(seconds * sample_rate) samples, peak below 1.
+    """Audio of a plan: float32, ``round(seconds * sample_rate)`` samples, peak below 1.
 
-    The active level is :data:`SPEECH_DBFS` plus the speaker's and the emotion's loudness. Any sample rate from 8 kHz
-    works; the same plan and generator give the same speech, moment by moment, with more or less treble; only the
-    grains of its noises differ. Raises `InputError` below 8 kHz.
+    The active level is :data:`SPEECH_DBFS` plus the speaker's and the emotion's loudness. The same plan and
+    generator give the same speech at any sample rate, with more or less treble; only the samples of its noises differ.
+
+    Raises:
+        InputError: a sample rate below 8 kHz.
     """
     if sample_rate < 8000:
         raise InputError(f"sample_rate is {sample_rate}: the voice needs at least 8000 Hz")
-    # A stream for each use: how much one draws may depend on the sample rate.
+    # One stream for each use: the number of draws may depend on the sample rate.
     streams = rng.spawn(9)
     style = session_voice(SPEAKERS[plan.speaker], streams[0])
-    emotion = shown(VOICE_EMOTIONS[plan.emotion], plan.strength)
+    emotion = scaled(VOICE_EMOTIONS[plan.emotion], plan.strength)
     count = round(plan.seconds * sample_rate)
     tracks = articulate(plan, emotion, streams[1])
     level = energy_contour(plan, tracks.times, streams[2])

@@ -11,8 +11,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh_reader import read_bvh
 from a2g_jax.io.textgrid import read_words
-from a2g_jax.talker import skeleton as body
-from a2g_jax.talker.skeleton import TALKER_SKELETON
+from a2g_jax.talker.skeleton import FOREARM, TALKER_SKELETON, UPPER_ARM
 from experiments.talker import movement
 
 
@@ -107,8 +106,8 @@ def ted_paths(directions: np.ndarray, fps: float) -> movement.Paths:
     bones = directions.reshape(len(directions), 42, 3) * np.array([1.0, -1.0, -1.0])
     neck = 0.26 * bones[:, 0]
     shoulders = neck[:, None] + 0.15 * bones[:, 1:3]
-    arms = body.UPPER_ARM * bones[:, [3, 20]] + body.FOREARM * bones[:, [4, 21]]
-    return movement.from_parts(shoulders + arms, None, shoulders, fps, body.UPPER_ARM + body.FOREARM)
+    arms = UPPER_ARM * bones[:, [3, 20]] + FOREARM * bones[:, [4, 21]]
+    return movement.from_parts(shoulders + arms, None, shoulders, fps, UPPER_ARM + FOREARM)
 
 
 def _speech(data: Path) -> Iterator[Take]:

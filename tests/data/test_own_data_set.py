@@ -15,7 +15,7 @@ from a2g_jax.talker.recordings import talk
 PAGE = Path(__file__).parents[2] / "docs" / "your_data_set.md"
 
 
-def test_the_example_prepares_a_corpus(tmp_path):
+def test_the_example_prepares_a_corpus(tmp_path, capsys):
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
     assert len([line for line in code.splitlines() if line.strip()]) <= 40
     reader = tmp_path / "my_reader.py"

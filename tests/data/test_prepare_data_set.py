@@ -38,7 +38,7 @@ def test_the_command_line_knows_every_reader():
         find_data_set("beet")
 
 
-def test_the_list_tells_of_everything(capsys):
+def test_the_list_is_complete(capsys):
     assert main(["prepare", "--list"]) == 0
     printed = capsys.readouterr().out
     for name in (*NAMES, *PRESETS):

@@ -67,7 +67,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def stop_after(path: Path, count: int) -> Path:
     """The unfinished work that Ctrl-C leaves."""
-    message = f"stopped after {count} of {COUNT} recordings; the same command goes on"
+    message = f"stopped after {count} of {COUNT} recordings; run the same command to resume"
     with pytest.raises(Interrupted, match=message):
         prepare_corpus(path, ITEMS, lambda done: make(done, stop_before=count), PLAN)
     assert not path.exists()
@@ -83,14 +83,14 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("count", [1, 4, COUNT - 1])
-def test_stopped_it_goes_on_where_it_was(tmp_path, whole, count):
+def test_resumes_where_it_was_stopped(tmp_path, whole, count):
     stop_after(tmp_path / "corpus", count)
-    said, calls = [], []
-    prepare_corpus(tmp_path / "corpus", ITEMS, lambda done: make(done, calls=calls), PLAN, said.append)
+    reported, calls = [], []
+    prepare_corpus(tmp_path / "corpus", ITEMS, lambda done: make(done, calls=calls), PLAN, reported.append)
     assert calls == list(range(count, COUNT))
-    assert f"going on after {count} of {COUNT} recordings" in said[0]
+    assert f"resuming after {count} of {COUNT} recordings" in reported[0]
     # The spread of bone lengths is over all recordings, not over those of the last start.
-    assert "up to 7.0 cm" in said[-1]
+    assert "up to 7.0 cm" in reported[-1]
     assert contents(tmp_path / "corpus") == whole
     assert list(tmp_path.iterdir()) == [tmp_path / "corpus"]
 
@@ -143,12 +143,12 @@ def test_a_damaged_journal_costs_only_what_it_does_not_tell(tmp_path, whole):
         assert contents(path) == whole
 
 
-def test_other_settings_start_over_and_say_so(tmp_path, whole):
+def test_other_settings_discard_unfinished_work(tmp_path, whole):
     stop_after(tmp_path / "corpus", 3)
-    said = []
+    reported = []
     other = Plan(Features(), {"reader": "noise", "speed": 2.0})
-    corpus = prepare_corpus(tmp_path / "corpus", ITEMS, make, other, said.append)
-    assert "unfinished work with other settings (speed: 1.0, now 2.0) was there; starting over" in said[0]
+    corpus = prepare_corpus(tmp_path / "corpus", ITEMS, make, other, reported.append)
+    assert "unfinished work with other settings (speed: 1.0, now 2.0) is discarded" in reported[0]
     assert corpus.recipe["speed"] == 2.0
 
 
@@ -157,10 +157,10 @@ def test_an_error_keeps_what_was_done(tmp_path, whole):
         yield from (noise(number) for number in range(done, 3))
         raise InputError("r3: is broken")
 
-    said = []
+    reported = []
     with pytest.raises(InputError, match="r3"):
-        prepare_corpus(tmp_path / "corpus", ITEMS, broken, PLAN, said.append)
-    assert f"3 of {COUNT} recordings are done; the same command goes on" in said[-1]
+        prepare_corpus(tmp_path / "corpus", ITEMS, broken, PLAN, reported.append)
+    assert f"3 of {COUNT} recordings are finished; run the same command to resume" in reported[-1]
     prepare_corpus(tmp_path / "corpus", ITEMS, make, PLAN)
     assert contents(tmp_path / "corpus") == whole
 
@@ -203,11 +203,11 @@ def test_files_that_changed_are_read_again(tmp_path, capsys):
     whole.write_text("HIERARCHY\n")
     with pytest.raises(InputError, match=r"2\.bvh"):
         prepare_data_set("folder", source, tmp_path / "corpus", Features())
-    assert "2 of 3 recordings are done" in capsys.readouterr().err
+    assert "2 of 3 recordings are finished" in capsys.readouterr().err
     whole.write_text(text)
     write_audio(source / "1.wav", takes[1].audio * 0.5, 16000)
     corpus = prepare_data_set("folder", source, tmp_path / "corpus", Features())
-    assert "going on after 1 of 3 recordings (1 of those done have changed" in capsys.readouterr().err
+    assert "resuming after 1 of 3 recordings (1 finished ones have changed" in capsys.readouterr().err
     again = prepare_data_set("folder", source, tmp_path / "again", Features())
     assert contents(corpus.path) == contents(again.path)
 

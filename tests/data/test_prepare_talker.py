@@ -55,7 +55,7 @@ def test_flags(tmp_path, short, capsys):
         (["talker", "--speakers", "ada,zoe"], "--speakers: there is no zoe; there are: ada, bruno,"),
         (["talker", "--emotions", "joy"], "--emotions: there is no joy; there are: neutral,"),
         (["talker", "--speakers", ","], "--speakers: empty list"),
-        (["talker", "--speakers", "ada,ada"], "a name comes twice in ada,ada"),
+        (["talker", "--speakers", "ada,ada"], "a name is repeated in ada,ada"),
         (["talker", "--jitter", "90"], "--jitter: expected degrees from 0 to 45; got 90"),
         (["talker", "--jitter", "much"], "expected a number above 0; got 'much'"),
         (["talker", "--workers", "0"], "from 1 to 1000; got '0'"),
@@ -80,7 +80,7 @@ def test_refusals(tmp_path, monkeypatch, capsys, arguments, message):
 
 
 def test_rotations_as_exponential_maps(tmp_path, short):
-    """What the flow's settings ask for; the same motion as in 6D."""
+    """The flow's settings; the same motion as in 6D."""
     options = TalkerOptions(minutes=0.2, seed=3, fps=20.0)
     maps = prepare_talker(tmp_path / "maps", options, find_features("stylized-flow"), workers=1)
     six = prepare_talker(tmp_path / "six", options, workers=1)

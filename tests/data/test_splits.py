@@ -15,12 +15,12 @@ frame_counts = st.lists(st.integers(1, 500), min_size=1, max_size=40)
 def test_every_frame_is_in_exactly_one_split(frames, seed):
     splits = split_recordings(frames, seed)
     assert tuple(splits) == NAMES
-    seen = [[0] * count for count in frames]
+    covered = [[0] * count for count in frames]
     for segment in (segment for name in NAMES for segment in splits[name]):
         assert segment.frames == segment.stop - segment.start > 0
         for frame in range(segment.start, segment.stop):
-            seen[segment.recording][frame] += 1
-    assert all(count == 1 for recording in seen for count in recording)
+            covered[segment.recording][frame] += 1
+    assert all(count == 1 for recording in covered for count in recording)
 
 
 @settings(max_examples=40, deadline=None)

@@ -113,7 +113,9 @@ def test_bits_of_a_flow_are_those_of_its_score(run, corpus):
     found = bits_per_dim(run, corpus)
     (start, *_), model = clip_starts(run.config, corpus, "test"), run.config.build()
     audio = run.config.statistics["audio"].normalise(np.asarray(corpus.audio[start : start + 24]))
-    nats = jax.jit(model.density.log_likelihood)(run.params, audio[None], np.asarray(corpus.pose[start : start + 24])[None])
+    nats = jax.jit(model.density.log_likelihood)(
+        run.params, audio[None], np.asarray(corpus.pose[start : start + 24])[None]
+    )
     np.testing.assert_allclose(found.clean_clips[0], -np.mean(nats) / (66 * math.log(2)), rtol=1e-5)
     assert found.clean.low < found.clean.mean < found.clean.high
     np.testing.assert_allclose(found.noisy.mean, found.noisy_clips.mean(), rtol=1e-12)

@@ -174,7 +174,10 @@ def test_edits_are_made_in_generation_alone():
     first, second = (sample(edited, jax.random.key(n)) for n in (0, 1))
     np.testing.assert_allclose(first, second, atol=1e-5)  # nothing that is drawn is left
     assert np.abs(np.asarray(sample(plain, jax.random.key(0)) - sample(plain, jax.random.key(1)))).max() > 1e-3
-    one, two = (joint_loss(model.stages[0])(params, jax.random.key(0), batch(DATA), jnp.int32(0))[0] for model in (plain, edited))
+    one, two = (
+        joint_loss(model.stages[0])(params, jax.random.key(0), batch(DATA), jnp.int32(0))[0]
+        for model in (plain, edited)
+    )
     assert one == two
 
 

@@ -47,7 +47,9 @@ def test_it_learns_emotions_from_its_input_alone(looks_at):
     for number in range(120):
         params, state = step(params, state, batch(number), jax.random.key(number))
     held = batch(10_000, clips=60)
-    right = lambda seen: float(model.stages[0].validation_loss(params, jax.random.key(0), seen, jnp.int32(0))[1]["accuracy"])  # noqa: E731
+    right = lambda seen: float(
+        model.stages[0].validation_loss(params, jax.random.key(0), seen, jnp.int32(0))[1]["accuracy"]
+    )  # noqa: E731
     assert right(held) > 0.9
     other = "audio" if looks_at == "motion" else "pose"
     assert right(held._replace(**{other: jnp.zeros_like(getattr(held, other))})) == right(held)
@@ -57,8 +59,12 @@ def test_dropout_acts_in_training_only():
     config = EmotionClassifierConfig(channels=(8,), hidden=8, dropout=0.5, clip_frames=20)
     model = build(config, DATA)
     params, seen = model.init(jax.random.key(0)), batch(0)
-    losses = {float(joint_loss(model.stages[0])(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)}
-    held = {float(model.stages[0].validation_loss(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)}
+    losses = {
+        float(joint_loss(model.stages[0])(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)
+    }
+    held = {
+        float(model.stages[0].validation_loss(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)
+    }
     assert (len(losses), len(held)) == (3, 1)
     assert classify(config, DATA, params, seen).shape == (24, 3)
 

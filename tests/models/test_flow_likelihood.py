@@ -74,7 +74,9 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
     def latents(inner):
         """Of the whole clip: a pose changes what all frames after it are told, too."""
         clip = flat.at[:, first:stop].set(inner.reshape(1, stop - first, 4))
-        return networks.latents(params, networks.inner(clip), networks.conditioning(params, batch.audio, clip))[0].ravel()
+        return networks.latents(params, networks.inner(clip), networks.conditioning(params, batch.audio, clip))[
+            0
+        ].ravel()
 
     inner = flat[:, first:stop].ravel()
     both = jax.jit(lambda inner: (latents(inner), jax.jacrev(latents)(inner)))

@@ -138,7 +138,7 @@ def test_entropy_is_minus_the_expected_log_probability(drawn):
 def test_agreement_is_what_pairs_of_draws_show(drawn):
     recording, _, draws = drawn
     first, second = draws[::2], draws[1::2]
-    seen = {
+    agreements = {
         "rest_pose": [[a.rest_pose == b.rest_pose] for a, b in zip(first, second, strict=True)],
         "posture": [[a.posture == b.posture] for a, b in zip(first, second, strict=True)],
         "stroke_family": [
@@ -147,13 +147,13 @@ def test_agreement_is_what_pairs_of_draws_show(drawn):
         ],
     }
     for name, field in (("hand", "hand"), ("place", "place"), ("hold", "holds"), ("family", "family")):
-        seen[name] = [
+        agreements[name] = [
             [getattr(u, field) == getattr(v, field) for u, v in zip(a.units, b.units, strict=True)]
             for a, b in zip(first, second, strict=True)
         ]
     choices = hidden_choices(recording)
-    assert set(choices) == set(seen)
-    for name, alike in seen.items():
+    assert set(choices) == set(agreements)
+    for name, alike in agreements.items():
         assert len(alike[0]) == choices[name].times, name
         estimate = sample_mean(np.mean(alike, axis=1))
         assert estimate.mean == pytest.approx(choices[name].agreement, abs=4 * estimate.standard_error), name
@@ -179,9 +179,9 @@ def test_full_agreement_in_a_short_recording():
         ("stroke_family", lambda draw: tuple(stroke.family for stroke in draw.strokes)),
     ):
         # The share of alike pairs among all pairs of draws, and its variance's leading term.
-        seen = np.array(list(Counter(of(draw) for draw in draws).values()))
-        share = np.sum(seen * (seen - 1)) / (count * (count - 1))
-        error = 2.0 * np.sqrt((np.sum((seen / count) ** 3) - share**2) / count)
+        times = np.array(list(Counter(of(draw) for draw in draws).values()))
+        share = np.sum(times * (times - 1)) / (count * (count - 1))
+        error = 2.0 * np.sqrt((np.sum((times / count) ** 3) - share**2) / count)
         assert error < 0.06 * share
         assert choices[name].full_agreement == pytest.approx(share, abs=4 * error), name
     assert choices["hand"].full_agreement == pytest.approx(choices["hand"].agreement ** 2)
@@ -189,9 +189,9 @@ def test_full_agreement_in_a_short_recording():
 
 def test_only_generated_recordings_are_known(take):
     foreign = replace(take, annotations={}, name="beat_take")
-    for ask in (hidden_choices, hidden_entropy, lambda r: expect(r, wrist_height, 2, 0)):
+    for function in (hidden_choices, hidden_entropy, lambda r: expect(r, wrist_height, 2, 0)):
         with pytest.raises(InputError, match="beat_take: is not a generated recording"):
-            ask(foreign)
+            function(foreign)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The generated corpus's gestures: what the audio decides, what is drawn, and whether the body moves like one."""
+"""The generated corpus's gestures: what the audio determines, what is drawn, and whether the motion is human."""
 
 import math
 from itertools import pairwise
@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
-from a2g_jax.talker import skeleton as body
-from a2g_jax.talker.arms import ARRIVAL
 from a2g_jax.talker.gesture_plan import (
     FAMILY_CHANGE,
     LEAD_RANGE,
@@ -18,15 +16,17 @@ from a2g_jax.talker.gesture_plan import (
     group_units,
     hand_probabilities,
 )
+from a2g_jax.talker.gesture_unit import ARRIVAL
 from a2g_jax.talker.gestures import gesticulate
 from a2g_jax.talker.ik import bend
 from a2g_jax.talker.paths import Track, bump, draw_waves, minimum_jerk
 from a2g_jax.talker.plan import plan_speech
 from a2g_jax.talker.reach import torso_distance
+from a2g_jax.talker.skeleton import PELVIS_HEIGHT, TALKER_SKELETON
 from a2g_jax.talker.speech import Phrase, PlannedWord, SpeechPlan, Syllable
 from a2g_jax.talker.styles import EMOTION_STYLES, FAMILIES, SPEAKER_STYLES, gesture_style
 
-JOINT = {name: index for index, name in enumerate(body.TALKER_SKELETON.names)}
+JOINT = {name: index for index, name in enumerate(TALKER_SKELETON.names)}
 WRISTS = {"left": JOINT["L_Wrist"], "right": JOINT["R_Wrist"]}
 SPEAKERS = tuple(SPEAKER_STYLES)
 
@@ -84,9 +84,9 @@ def everyone(seconds=16.0):
 
 
 def test_skeleton_is_an_adult_of_one_metre_seventy():
-    skeleton = body.TALKER_SKELETON
+    skeleton = TALKER_SKELETON
     places = np.zeros((22, 3))
-    places[0, 1] = body.PELVIS_HEIGHT
+    places[0, 1] = PELVIS_HEIGHT
     for joint, parent in enumerate(skeleton.parents[1:], start=1):
         places[joint] = places[parent] + skeleton.offsets[joint]
     ends = {joint: places[joint] + end for joint, end in skeleton.ends}
@@ -296,7 +296,7 @@ def test_plan_without_accents_keeps_the_hands_at_rest():
     assert speed.max() < 0.5
 
 
-# --- the body ---------------------------------------------------------------------------------------------------
+# --- the motion ---------------------------------------------------------------------------------------------------
 
 
 def test_rotations_are_rotations():
@@ -366,7 +366,7 @@ def test_jerk_is_bounded():
     for seed in range(3):
         _, motion, _ = draw(seed=seed, fps=120.0, speaker="felix", emotion="anger")
         _, places = fk(motion)
-        # 1e-7 m of float32 rounding is 0.2 m/s^3 at 120 fps: far below what is asked.
+        # 1e-7 m of float32 rounding is 0.2 m/s^3 at 120 fps: far below the limit.
         jerk = np.linalg.norm(np.diff(places, n=3, axis=0), axis=2) * 120.0**3
         # Fast hands that pass each other move apart quickly; strokes alone stay below 6000.
         assert jerk.max() < 20000.0

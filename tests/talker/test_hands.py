@@ -1,4 +1,4 @@
-"""Finger motion of the generated corpus: the skeleton, what hands show, and that the body does not notice."""
+"""Finger motion of the generated corpus: the skeleton, hand shapes, and that the other joints do not change."""
 
 import numpy as np
 import pytest

@@ -159,16 +159,16 @@ def test_keypoints_are_what_a_camera_sees(take):
     assert found.shape == (120, 49, 2)
     points = landmarks(resample(take.motion, 15.0))
 
-    def seen(point):
+    def projected(point):
         """The camera as a 3 x 4 matrix: intrinsics times pose."""
         pose = np.array([[1.0, 0, 0, 0], [0, -1.0, 0, 1.2], [0, 0, -1.0, 3.0]])
         u, v, w = np.diag([1500.0, 1500.0, 1.0]) @ pose @ np.append(point, 1.0)
         return np.array([u / w, v / w])
 
     for frame in (0, 33, 119):
-        neck = seen((points["L_Shoulder"][frame] + points["R_Shoulder"][frame]) / 2)
+        neck = projected((points["L_Shoulder"][frame] + points["R_Shoulder"][frame]) / 2)
         for index, name in ((1, "R_Shoulder"), (3, "R_Wrist"), (5, "L_Elbow"), (11, "L_Thumb3_End"), (47, "R_Pinky3")):
-            np.testing.assert_allclose(found[frame, index], seen(points[name][frame]) - neck, atol=1e-9)
+            np.testing.assert_allclose(found[frame, index], projected(points[name][frame]) - neck, atol=1e-9)
 
 
 def test_keypoint_layout(take):
@@ -208,10 +208,10 @@ def test_detector_is_worse_on_fast_points():
     moving = np.zeros((4000, 49, 2))
     moving[:, 10, 0] = 30.0 * np.arange(4000)
     noisy, confidence = Detector(loss=0.01).detect(moving, np.random.default_rng(1))
-    seen = confidence > 0
-    fast, slow = (np.std((noisy - moving)[:, joint][seen[:, joint]]) for joint in (10, 11))
+    detected = confidence > 0
+    fast, slow = (np.std((noisy - moving)[:, joint][detected[:, joint]]) for joint in (10, 11))
     assert fast > 2 * slow
-    assert (~seen[:, 10]).mean() > 1.5 * (~seen[:, 11]).mean()
+    assert (~detected[:, 10]).mean() > 1.5 * (~detected[:, 11]).mean()
     again, _ = Detector(loss=0.01).detect(moving, np.random.default_rng(1))
     np.testing.assert_array_equal(noisy, again)
 
@@ -330,7 +330,7 @@ def test_jitter_has_the_size_that_is_asked_for():
     noisy = add_jitter(still, 1.0, np.random.default_rng(3))
     vectors = np.rad2deg(Rotation.from_matrix(noisy.rotations.reshape(-1, 3, 3)).as_rotvec())
     vectors = vectors.reshape(still.frames, -1, 3)
-    # Pops are rare: a robust spread tells the noise without them.
+    # Pops are rare: a robust spread is that of the noise without them.
     spread = 1.4826 * np.median(np.abs(vectors), axis=(0, 2))
     np.testing.assert_allclose(spread, joint_weights(still.skeleton.parents), rtol=0.12)
     assert spread[still.skeleton.index("L_Wrist")] > 2 * spread[0]

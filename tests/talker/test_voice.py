@@ -299,7 +299,7 @@ def test_sample_rates_give_the_same_speech(rate):
     spectrum = np.square(np.abs(np.fft.rfft(audio)))
     hertz = np.fft.rfftfreq(len(audio), 1.0 / rate)
     bands = [10.0 * np.log10(spectrum[(hertz >= a) & (hertz < b)].mean()) for a, b in ((6000, 8000), (8000, 11000))]
-    assert 2.0 < bands[0] - bands[1] < 15.0  # frication goes on above 8 kHz, softer
+    assert 2.0 < bands[0] - bands[1] < 15.0  # frication continues above 8 kHz, softer
 
 
 def test_same_seed_same_audio_other_seed_other_audio():
@@ -327,7 +327,7 @@ def test_energy_peaks_where_the_plan_says_and_accents_are_heard(speaker, emotion
     assert np.max(errors[strong]) < 0.05
     assert np.mean(errors < 0.03) > 0.85  # unaccented syllables, too, for the most part
     assert 5.0 < np.median(found[strong, 1]) - np.median(found[accent == 0.0, 1]) < 12.0
-    # A listener who only knows the peaks' levels tells accented from unaccented syllables.
+    # The peaks' levels alone separate accented from unaccented syllables.
     pairs = found[strong, 1][:, None] > found[accent == 0.0, 1][None, :]
     assert np.mean(pairs) > 0.94
 

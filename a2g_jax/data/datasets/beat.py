@@ -24,12 +24,12 @@ _EXPECTED = (
 )
 _NAME = re.compile(r"([0-9]{1,2})_([a-z]+)_([0-7])_([0-9]{1,3})_([0-9]{1,3})")
 _SUFFIXES = (".bvh", ".wav", ".textgrid", ".csv", ".txt", ".json")
-#: Suffixes of takes that cannot do without a partner; the labels of some takes are missing in the release.
+#: Suffixes that every take needs; the labels of some takes are missing in the release.
 _RECORDED = (".bvh", ".wav")
 
 
 def find(folder: Path) -> list[Take]:
-    """All takes under the folder, in the order of speaker, type and sequence; labels may lie in a tree of their own."""
+    """All takes under the folder, in the order of speaker, type and sequence; labels may be in a separate tree."""
     files = list_files(folder, _EXPECTED)
     groups = files_by_name(files, lambda stem: stem if _parse(stem) else None, _SUFFIXES)
     groups = {name: group for name, group in groups.items() if not group.keys().isdisjoint(_RECORDED)}
@@ -64,7 +64,7 @@ def _parse(stem: str) -> _Name | None:
 def read(take: Take, sample_rate: int) -> Recording:
     """A take with its words and emotion.
 
-    Annotations: ``language``, ``scenario`` (speech or conversation), ``speaker_id``, and where their files are there:
+    Annotations: ``language``, ``scenario`` (speech or conversation), ``speaker_id``, and if their files exist:
     ``phones``, ``emotions`` and ``semantic`` (timed labels), ``transcript`` (running text that other languages than
     English may have in place of semantic labels) and ``face`` (its file, number of frames and rate, and the time in
     it at which the recording starts; not read).
@@ -72,7 +72,7 @@ def read(take: Take, sample_rate: int) -> Recording:
     files = {Path(source).suffix.lower(): Path(source) for source in take.sources}
     name = _parse(files[".bvh"].stem)
     if name is None:
-        raise InputError(f"{files['.bvh']}: is not named as a take of BEAT; name it as in 2_scott_0_1_1.bvh.")
+        raise InputError(f"{files['.bvh']}: is not named like a take of BEAT; rename it, such as 2_scott_0_1_1.bvh.")
     annotations: dict[str, Any] = {
         "language": LANGUAGES[name.kind // 2],
         "scenario": "conversation" if name.kind % 2 else "speech",
@@ -109,7 +109,7 @@ DATASET = DataSet(
     read=read,
     about=(
         "github.com/PantoMatrix/PantoMatrix, CC BY-NC 4.0. Name beat_english_v0.2.1 or a folder of several languages. "
-        "The official split of the English data goes by sequence number (the README's); first sequences of speakers "
-        "of one hour come as two halves, a and b. Other papers split otherwise: EmotionGesture takes 70/10/20 percent."
+        "The official split of the English data is by sequence number (the README's); first sequences of speakers "
+        "of one hour are two halves, a and b. Other papers have other splits: EmotionGesture takes 70/10/20 percent."
     ),
 )

@@ -4,11 +4,11 @@ Layout: ``beat_<language>_v2.0.0/{smplxflame_30/<id>.npz, wave16k/<id>.wav, text
 ``train_test_split.csv`` (``id,type``), as EMAGE's ``beat_sep.py`` opens them. The 55 joints of ``poses`` are 22 of the
 body, jaw, two eyes, 15 of the left and 15 of the right hand (issue 133 of PantoMatrix).
 
-What is made of them:
+How they are read:
 
 - A motion of 52 joints, body and fingers. Expressions and jaw are left out; ``annotations["face"]`` counts them.
-- Rotations are exact; ``betas`` are ignored and bones are those of our own average body, so positions are approximate
-  (:mod:`~a2g_jax.data.datasets.smplx`). Finger rotations are whole ones from flat hands, not offsets from a mean hand:
+- Rotations are exact; ``betas`` are ignored and bones are those of the talker's average adult, so positions are
+  approximate (:mod:`~a2g_jax.data.datasets.smplx`). Finger rotations are relative to flat hands, not to a mean hand:
   on the recording 2_scott_0_1_1 they bend fingers as the BVH of BEAT does.
 - The world is y-up and the body looks along z, as in that recording; nothing is turned.
 - ``additional`` in the table is for training: EMAGE adds it to the training set or leaves it out.
@@ -69,7 +69,7 @@ def _takes(language: Path) -> list[Take]:
 
 
 def read(take: Take, sample_rate: int) -> Recording:
-    """Speech, words, the motion of body and fingers, and what was annotated.
+    """Speech, words, the motion of body and fingers, and annotations.
 
     Raises:
         InputError: a file is missing or damaged, or an array has another shape or rate than BEAT2's.

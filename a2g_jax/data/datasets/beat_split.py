@@ -13,10 +13,10 @@ _LAST_OF_EMOTION = frozenset({72, 80, 86, 94, 102, 110, 118})
 
 
 class Part(NamedTuple):
-    """What the split takes of a recording."""
+    """A part of a recording in the split."""
 
     label: str
-    """Behind the recording's name: ``""`` for the whole, ``"a"`` and ``"b"`` for its halves."""
+    """Suffix of the recording's name: ``""`` for the whole, ``"a"`` and ``"b"`` for its halves."""
     split: str
     start: float
     """Seconds."""
@@ -24,11 +24,11 @@ class Part(NamedTuple):
 
 
 def parts(speaker: int, kind: int, first: int, last: int) -> tuple[Part, ...]:
-    """The recording as the split has it.
+    """The parts of a recording in the split.
 
     Speakers of four hours are split by sequence number. Of those of one hour, the first sequence of each emotion and
-    the first conversation are cut into a half for testing and one for validation. Numbers that the README puts
-    nowhere are for training, as its script leaves them there. Other languages have no split, nor has a recording of
+    the first conversation are cut into a half for testing and one for validation. Numbers that the README
+    does not list are for training, as in its script. Other languages have no split, nor has a recording of
     several sequences that are split differently.
 
     Args:

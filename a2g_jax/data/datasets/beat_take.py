@@ -1,6 +1,6 @@
-"""What BEAT says about a recording: the emotion of its sequence number, and the files of labels beside it.
+"""Labels of a BEAT recording: the emotion of its sequence number, and the label files beside it.
 
-From the README of github.com/PantoMatrix/PantoMatrix; BEAT2 has names and semantic labels of the same form.
+From the README of github.com/PantoMatrix/PantoMatrix; names and semantic labels of BEAT2 have the same form.
 """
 
 import math
@@ -19,7 +19,7 @@ LANGUAGES = ("english", "chinese", "spanish", "japanese")
 _LAST = (64, 72, 80, 86, 94, 102, 110, 118)
 _FACE_FPS = 60.0
 _LARGEST_FACE = 2**30
-#: Running text beside a recording is not longer than this, bytes.
+#: Longest running text beside a recording, bytes.
 _LONGEST_TEXT = 2**20
 
 
@@ -38,7 +38,7 @@ def emotion(kind: int, first: int, last: int) -> str:
 
 
 def read_phones(path: Path) -> list[dict[str, Any]]:
-    """The phones of a TextGrid whose words can be read; none where it has no tier of them."""
+    """The phones of a TextGrid whose words can be read; an empty list without a tier of them."""
     try:
         phones = read_words(path, "phones")
     except InputError:
@@ -69,7 +69,7 @@ def read_semantics(path: Path) -> list[dict[str, Any]]:
     """Kinds of gesture over time, from tab-separated ``name, start, end, duration, score, keywords``.
 
     Returns:
-        ``label``, ``start`` and ``end`` in seconds, ``score`` (how much the gesture means) and ``keywords`` of each.
+        ``label``, ``start`` and ``end`` in seconds, ``score`` (how meaningful the gesture is) and ``keywords``.
 
     Raises:
         InputError: a line of another form (with its number).
@@ -103,10 +103,10 @@ def _number(path: Path, line: int, cell: str) -> float:
 
 
 def read_text(path: Path, *, english: bool) -> dict[str, Any]:
-    """What the ``.txt`` beside a recording says: ``semantic`` labels over time, or ``transcript``.
+    """Contents of the ``.txt`` beside a recording: ``semantic`` labels over time, or ``transcript``.
 
     Raises:
-        InputError: it holds no semantic labels. In other languages than English it is then running text.
+        InputError: no semantic labels in an English one; those of other languages may have running text instead.
     """
     try:
         return {"semantic": read_semantics(path)}

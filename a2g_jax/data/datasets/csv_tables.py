@@ -1,4 +1,4 @@
-"""Tables as text: cells between commas or tabs, as data sets come with."""
+"""Tables as text, with cells between commas or tabs."""
 
 import csv
 import io
@@ -12,9 +12,9 @@ _LARGEST_FILE = 2**26
 
 
 def read_cells(path: Path, delimiter: str = ",") -> list[tuple[int, list[str]]]:
-    """Line number and cells (stripped) of each line that holds something; nothing for an empty file.
+    """Line number and stripped cells of each line that is not blank; an empty list for an empty file.
 
-    Any line ends; UTF-8 with or without a byte-order mark, or UTF-16 with one. Quotes count between commas only.
+    Any line ends; UTF-8 with or without a byte-order mark, or UTF-16 with one. Quotes are special between commas only.
 
     Raises:
         InputError: no such file, binary, in another encoding, too large, or with an open quote (with the line).
@@ -43,7 +43,7 @@ def read_cells(path: Path, delimiter: str = ",") -> list[tuple[int, list[str]]]:
             if any(cell.strip() for cell in row):
                 result.append((rows.line_num, [cell.strip() for cell in row]))
     except csv.Error as error:
-        raise InputError(f"{path}, line {rows.line_num}: is damaged ({error}); correct it there.") from None
+        raise InputError(f"{path}, line {rows.line_num}: is damaged ({error}); correct that line.") from None
     return result
 
 
@@ -53,7 +53,7 @@ def read_columns(path: Path, columns: Sequence[str]) -> list[tuple[int, dict[str
     Names of columns are compared without regard to case; other columns are left out.
 
     Raises:
-        InputError: as :func:`read_cells`; without a column; or a row that is too short for one.
+        InputError: as :func:`read_cells`; no such column; or a row without a cell for one.
     """
     rows = read_cells(path)
     header = [name.lower() for name in rows[0][1]] if rows else []

@@ -8,23 +8,23 @@ from a2g_jax.errors import InputError
 
 
 def cut(recording: Recording, start: float, end: float | None = None) -> Recording:
-    """The recording from ``start`` to ``end`` (None: to its end), seconds, with times counted from ``start``.
+    """The recording from ``start`` to ``end`` (None: to its end), seconds, with times relative to ``start``.
 
-    Words and timed labels (annotations that are lists of entries with ``start`` and ``end``) that reach over an end
-    are cut there. A piece that the recording is too short for ends where the recording does.
+    Words and timed labels (annotations that are lists of entries with ``start`` and ``end``) are cut at both ends. The
+    piece ends with the recording if ``end`` is later.
 
     Raises:
-        InputError: nothing of the motion or the audio lies there.
+        InputError: no motion or no audio in the piece.
     """
     motion, rate = recording.motion, recording.sample_rate
     stop = max(motion.seconds, len(recording.audio) / rate) if end is None else end
     moved = motion.clip(round(start * motion.fps), round(stop * motion.fps))
-    heard = recording.audio[round(start * rate) : round(stop * rate)]
-    if moved.frames == 0 or len(heard) == 0:
+    audio = recording.audio[round(start * rate) : round(stop * rate)]
+    if moved.frames == 0 or len(audio) == 0:
         raise InputError(
             f"{', '.join(recording.sources) or recording.name}: {motion.seconds:.2f} s of motion and "
             f"{len(recording.audio) / rate:.2f} s of audio; expected more than {start} s, where the piece "
-            f"{recording.name} starts. Is a file cut short?"
+            f"{recording.name} starts; download cut files again."
         )
     words = tuple(
         Word(word.text, max(word.start - start, 0.0), min(word.end, stop) - start)
@@ -32,7 +32,7 @@ def cut(recording: Recording, start: float, end: float | None = None) -> Recordi
         if word.end > start and word.start < stop
     )
     annotations = {name: _shifted(value, start, stop) for name, value in recording.annotations.items()}
-    return replace(recording, motion=moved, audio=heard, words=words, annotations=annotations)
+    return replace(recording, motion=moved, audio=audio, words=words, annotations=annotations)
 
 
 def _shifted(value: Any, start: float, stop: float) -> Any:

@@ -1,8 +1,8 @@
-"""Points and bones of poses that have no skeleton, in the order of the data sets.
+"""Points and bones of poses without a skeleton, in the order of the data sets.
 
-TED Gesture and TED-Expressive: the pairs and the lengths that their authors' code draws poses with (``dir_vec_pairs``
+TED Gesture and TED-Expressive: the pairs and the lengths with which their authors' code draws poses (``dir_vec_pairs``
 in ``data_utils.py`` of Yoon et al. 2020 and in ``data_utils_expressive.py`` of Liu et al. 2022), as
-:mod:`~a2g_jax.talker.views.directions` has them. Speech2Gesture and PATS: the order of ``joint_names`` in PATS'
+in :mod:`~a2g_jax.talker.views.directions`. Speech2Gesture and PATS: the order of ``joint_names`` in PATS'
 ``skeleton.py``, which is that of ``consts.py`` of Ginosar et al. 2019 (there, 7 to 27 are the left hand and 28 to 48
 the right one once nose and eyes are gone).
 """
@@ -33,5 +33,5 @@ def _keypoint_bones() -> tuple[tuple[int, int], ...]:
 
 
 S2G_LAYOUT = PoseLayout(names=KEYPOINTS, bones=_keypoint_bones())
-"""49 points: neck, right arm, left arm, left hand, right hand; wrists come twice, as the end of an arm and as the start
-of a hand."""
+"""49 points: neck, right arm, left arm, left hand, right hand; wrists occur twice, as the end of an arm and as the
+start of a hand."""

@@ -1,4 +1,4 @@
-"""Finding the recordings of a data set: folders, large tables, names."""
+"""Helpers that find the recordings of a data set: folders, large tables, names."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -10,12 +10,12 @@ from a2g_jax.data.datasets.source import Take
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable
 
-#: What data sets call the parts of their official splits.
+#: Parts of the official splits by the data sets' names of them.
 SPLIT_NAMES = {"train": "train", "val": "validation", "valid": "validation", "dev": "validation", "test": "test"}
 
 
 def check_folder(folder: Path, expected: str) -> None:
-    """Raise ``InputError`` unless there is such a folder; ``expected`` says what to name instead."""
+    """Raise ``InputError`` unless there is such a folder; ``expected`` is the folder that the user should name."""
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; name {expected}.")
 
@@ -28,7 +28,7 @@ def files_with(folder: Path, suffix: str, expected: str) -> list[Path]:
 def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:
     """Line number and named columns of each row of a comma-separated table with a header, one row at a time.
 
-    For tables of a row a window, which :func:`~a2g_jax.data.datasets.csv_tables.read_columns` is too small for.
+    For tables with a row a window, too large for :func:`~a2g_jax.data.datasets.csv_tables.read_columns`.
 
     Raises:
         InputError: no such file, not UTF-8 text, without a column, or a row that is too short.
@@ -55,7 +55,7 @@ def table_rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[s
 
 
 def unique_names(takes: Sequence[Take]) -> list[Take]:
-    """The takes, with ``-2``, ``-3`` ... behind names that come again."""
+    """The takes, with ``-2``, ``-3`` ... appended to repeated names."""
     used: set[str] = set()
     result = []
     for take in takes:

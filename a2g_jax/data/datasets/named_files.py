@@ -1,4 +1,4 @@
-"""The files of a data set by the names of its recordings, in whatever folders they lie."""
+"""The files of a data set by the names of its recordings, in any folders."""
 
 import os
 import warnings
@@ -15,10 +15,10 @@ def list_files(folder: Path, expected: str) -> list[Path]:
     """Every file under a folder, sorted by path; links are followed, hidden files and folders are not.
 
     Args:
-        expected: the folder to name instead, for the message.
+        expected: the folder that the user should name, for the message.
 
     Raises:
-        InputError: no such folder, or a folder in it that may not be read.
+        InputError: no such folder, or no permission to read a folder in it.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; name {expected}.")
@@ -27,13 +27,13 @@ def list_files(folder: Path, expected: str) -> list[Path]:
         raise InputError(f"{error.filename}: cannot be read ({error.strerror}); change its permissions.")
 
     result: list[Path] = []
-    seen: set[str] = set()
+    visited: set[str] = set()
     for place, folders, names in os.walk(folder, onerror=refuse, followlinks=True):
         real = os.path.realpath(place)
-        if real in seen:  # links that lead in a circle, or twice to one place
+        if real in visited:  # links that form a circle, or lead twice to one place
             folders.clear()
             continue
-        seen.add(real)
+        visited.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith((".", "__MACOSX")))
         result += [Path(place, name) for name in names if not name.startswith(".")]
     return sorted(result)
@@ -44,7 +44,7 @@ def files_by_name(files: Sequence[Path], name_of: Callable[[str], str | None], s
 
     Args:
         name_of: the recording's name from a file's name without its suffix, None for a file of something else.
-        suffixes: those that count, in lower case with their dot.
+        suffixes: those of recordings, in lower case with their dot.
 
     Raises:
         InputError: two files of one recording and suffix.
@@ -67,7 +67,7 @@ def require(files: Mapping[str, Path], suffix: str, kind: str) -> Path:
     """The file of a recording with a suffix.
 
     Raises:
-        InputError: it has none; the message names another file of the recording.
+        InputError: there is none; the message names another file of the recording.
     """
     if suffix not in files:
         raise InputError(f"{min(files.values())}: has no {kind} of the same name; add or remove it.")
@@ -75,10 +75,9 @@ def require(files: Mapping[str, Path], suffix: str, kind: str) -> Path:
 
 
 def without_motion(files: NamedFiles, is_test: Callable[[str], bool]) -> set[str]:
-    """Names of the test recordings, if none of them has motion: challenges release their test set so at first.
+    """Names of the test recordings, if none of them has motion, as when challenges first release their test set.
 
-    They are left out with a warning that counts them. Where only some lack it, files are missing, and none is left
-    out.
+    A warning counts them. Where only some lack motion, files are missing, and the result is empty.
     """
     tests = {name for name in files if is_test(name)}
     if not tests or any(".bvh" in files[name] for name in tests):

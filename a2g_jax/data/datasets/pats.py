@@ -1,18 +1,18 @@
 """PATS (Ahuja et al. 2020, "Style Transfer for Co-Speech Gesture Animation"): keypoints of 25 speakers' videos.
 
 Layout after the README and ``skeleton.py`` of github.com/chahuja/pats: ``cmu_intervals_df.csv`` (dataset, delta_time,
-end_time, interval_id, speaker, start_time, video_fn, video_link), ``processed/<speaker>/<interval>.h5`` and, where they
-were made, ``raw/<speaker>_cropped/<interval>.mp3``. ``pose/data`` of an h5 is (T, 104) at 15 frames a second: x of 52
+end_time, interval_id, speaker, start_time, video_fn, video_link), ``processed/<speaker>/<interval>.h5`` and, if
+extracted, ``raw/<speaker>_cropped/<interval>.mp3``. ``pose/data`` of an h5 is (T, 104) at 15 frames a second: x of 52
 points, then y; point 0 is the neck in pixels, the others are relative to it.
 
-- Read as 49 keypoints relative to the neck, in the order of Speech2Gesture: nose and eyes go (``joint_subset``), and so
-  does where the neck is. Lost ones (NaN) are bridged for up to half a second.
-- **Speech.** The h5 hold log-mels but no samples, and other features cannot be made of those. PATS' script
-  ``youtube2croppedaudio/youtube2audio.py`` makes the mp3; an interval without one is refused, and so is a folder in
-  which no interval has one.
+- Read as 49 keypoints relative to the neck, in the order of Speech2Gesture: nose and eyes are dropped
+  (``joint_subset``), and so is the neck's position. Gaps (NaN) are bridged for up to half a second.
+- **Speech.** The h5 hold log-mels but no samples, and other features cannot be computed from those. PATS' script
+  ``youtube2croppedaudio/youtube2audio.py`` makes the mp3; an interval without one raises an error, and so does
+  a folder in which no interval has one.
 - Words (``text/meta``) are a pickled pandas table and are not read.
 - The split is that of the table. The authors leave out the intervals in ``missing_intervals.h5``, which lack some
-  feature; poses and speech are all that is needed here, so they are read.
+  feature; they are read here, where only poses and speech are needed.
 """
 
 from pathlib import Path
@@ -40,7 +40,7 @@ _LIMITS = Limits(size=2**28)
 
 
 def find(folder: Path) -> list[Take]:
-    """A take for each h5, in the order of speakers and intervals; ``folder`` is PATS' ``data`` or the one above."""
+    """A take for each h5, in the order of speakers and intervals; ``folder`` is PATS' ``data`` or its parent."""
     root = folder if (folder / "processed").is_dir() else folder / "data"
     files = files_with(root / "processed", ".h5", f"a folder that is {_EXPECTED}") if root.is_dir() else []
     if not files:
@@ -80,7 +80,7 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
     """Speech and 49 keypoints of an interval.
 
     Raises:
-        InputError: there is no speech, or the h5 is damaged or holds another pose.
+        InputError: no speech, or the h5 is damaged or has another pose.
     """
     sound, path = take.sources
     if not Path(sound).is_file():
@@ -113,6 +113,6 @@ DATASET = DataSet(
     about=(
         "From chahuja.com/pats, CC BY-NC 2.0, with the speech of the videos that it lists. cmu_intervals_df.csv, whose"
         " column 'dataset' is the official split, processed/<speaker>/<interval>.h5 and raw/<speaker>_cropped/. Needs"
-        " h5py. 49 keypoints, as Speech2Gesture has them."
+        " h5py. 49 keypoints in the format of Speech2Gesture."
     ),
 )

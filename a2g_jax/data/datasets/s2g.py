@@ -6,19 +6,19 @@ and ``audio`` at 16 kHz, from the time of the first frame to that of the last on
 windows is read: the interval and the times from their names (colons may be underscores), the speaker from the folder
 above ``train``, and no split. Windows named ``<interval>-<first frame>.npz`` are read too, at 15 frames a second.
 
-Windows of an interval start 5 frames apart and so share most of their frames: dealt out one by one, the same second
-would be in training and in test. Here the windows of an interval are joined into one recording:
+Windows of an interval start 5 frames apart and share most of their frames: split one by one, the same second would be
+in training and in test. Therefore the windows of an interval are joined into one recording:
 
-- They are put in the order of their times. Only every sixth or so is opened: the last one that still shares half of
-  its frames with the one before.
-- The frames that both have must be equal where the times say (give or take one), else the recording is refused.
-- Where windows are missing, a new recording begins (``<interval>-part2``); it shares no frame with the others. So it
-  does where frames are missing: windows that last longer than others of their interval are left out, since poses and
-  speech would part there.
-- Audio is laid by the times; a recording has as much as the last window ends with, a frame less than the poses.
+- They are sorted by time. Only about every sixth is opened: the last one that still shares half of its frames with
+  the one before.
+- Shared frames must be equal at the shift that the times give (within one frame), else an error is raised.
+- Where windows are missing, a new recording begins (``<interval>-part2``), which shares no frame with the others. The
+  same holds where frames are missing: windows that last longer than others of their interval are left out, since
+  poses and speech would be out of step.
+- Audio is placed by the times; it ends with the last window's, a frame earlier than the poses.
 
-Keypoints are 49, relative to point 0 (of 52, nose and eyes go, as in ``get_pose``); lost ones (NaN) are bridged for up
-to half a second. The table has training and dev windows only; the test set is cut from videos by other code.
+Keypoints are 49, relative to point 0 (of 52, nose and eyes are dropped, as in ``get_pose``); gaps (NaN) are bridged for
+up to half a second. The table has training and dev windows only; the test set is cut from videos by other code.
 """
 
 import re
@@ -94,7 +94,7 @@ def _intervals_of_table(table: Path) -> dict[tuple[str, str, str], list[_Window]
 
 
 def _locate(folder: Path, written: str, speaker: str) -> Path:
-    """Where a window is: where its author's machine had it, below our folder."""
+    """The file of a window: at its path in the table, below our folder."""
     name = PureWindowsPath(written).name if "\\" in written else PurePosixPath(written).name
     for path in (folder / speaker / "train" / "npz" / name, folder / written):
         if path.is_file():
@@ -114,8 +114,8 @@ def _intervals_of_names(folder: Path) -> dict[tuple[str, str, str], list[_Window
             end = start + (WINDOW - 1) / FPS
         else:
             raise InputError(
-                f"{path}: its name tells no interval and no time; expected <interval>-<start>-<end>.npz as"
-                " Speech2Gesture's code names windows, so that those that overlap can be joined."
+                f"{path}: its name has no interval and no time; expected <interval>-<start>-<end>.npz as"
+                " written by Speech2Gesture's code, so that overlapping windows can be joined."
             )
         intervals.setdefault((speaker, match["interval"], ""), []).append(_Window(start, end, str(path)))
     return intervals
@@ -130,7 +130,7 @@ def _seconds(text: str) -> float | None:
 
 
 def _stretches(windows: list[_Window]) -> Iterable[list[_Window]]:
-    """Windows without a jump in time, in order, apart where one begins after all before it have ended."""
+    """Runs of windows without a gap in time, in order."""
     part: list[_Window] = []
     reached = 0.0
     usual = min(window.end - window.start for window in windows)
@@ -146,7 +146,7 @@ def _stretches(windows: list[_Window]) -> Iterable[list[_Window]]:
 
 
 def _enough(windows: list[_Window]) -> list[_Window]:
-    """The first and the last window of a stretch, and as few between as half overlap each other, where it can be."""
+    """The first and the last window of a run, and the fewest between that overlap by half, where possible."""
     chosen = [windows[0]]
     for window, following in pairwise([*windows[1:], windows[-1]]):
         last = chosen[-1]
@@ -159,12 +159,12 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
     """Speech and 49 keypoints of a stretch of an interval.
 
     Raises:
-        InputError: a window is missing, damaged or of another shape, or is not a piece of the same recording.
+        InputError: a window is missing, damaged, of another shape, or of another recording.
     """
     times = [(float(start), float(end)) for start, end in take.spec["times"]]
     pose, sound = _read_window(take.sources[0])
     poses, sounds = [pose], [sound]
-    frame = sample = 0  # at which the last window begins
+    frame = sample = 0  # start of the last window
     for number, (before, path) in enumerate(pairwise(take.sources), start=1):
         start, end = times[number]
         following, speech = _read_window(path)
@@ -173,12 +173,12 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
         shift = _shift(pose, following, (guess, guess + 1, guess - 1))
         if shift is None:
             raise InputError(
-                f"{path}: is no continuation of {before}, whose frames it should share; extract this interval anew."
+                f"{path}: does not continue {before}, whose frames it should share; extract this interval again."
             )
         offset = int((start - times[0][0]) * AUDIO_RATE + 1e-3) - sample
         if offset > len(sound):
-            raise InputError(f"{before}, audio: ends before the next window begins; extract this interval anew.")
-        # Whoever cut the windows may have rounded to the other side.
+            raise InputError(f"{before}, audio: ends before the next window begins; extract this interval again.")
+        # The windows' authors may have rounded the other way.
         found = _shift(sound, speech, (offset, offset + 1, offset - 1))
         offset = offset if found is None else found
         poses.append(following[len(pose) - shift :])
@@ -206,13 +206,13 @@ def _read_window(path: str) -> tuple[Float[np.ndarray, "T P 2"], np.ndarray]:
         raise InputError(f"{path}, pose: expected numbers of shape (T, 2, 49 or 52); got {pose.dtype} {pose.shape}.")
     if len(pose) < 2 or sound.ndim != 1 or sound.dtype.kind not in "if":
         raise InputError(
-            f"{path}: has {len(pose)} frames and audio {sound.dtype} of shape {sound.shape}; make the window anew."
+            f"{path}: has {len(pose)} frames and audio {sound.dtype} of shape {sound.shape}; extract the window again."
         )
     return np.swapaxes(pose, 1, 2).astype(np.float64), sound
 
 
 def _shift(before: np.ndarray, after: np.ndarray, candidates: Sequence[int]) -> int | None:
-    """By how much ``after`` begins later than ``before``: the first candidate at which what both have is equal."""
+    """Shift of ``after`` against ``before``: the first candidate at which their shared part is equal."""
     for shift in candidates:
         shared = min(len(before) - shift, len(after))
         if shift >= 0 and shared > 0 and np.array_equal(before[shift : shift + shared], after[:shared], equal_nan=True):

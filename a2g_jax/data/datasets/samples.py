@@ -1,4 +1,4 @@
-"""Speech that lies in an archive as an array and not in an audio file of its own."""
+"""Speech from arrays in archives."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,7 +6,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import SILENCE
 
-#: Peak above which floating-point samples cannot be audio in -1 to 1.
+#: Peak beyond which floating-point samples are in another unit than -1 to 1.
 _LOUDEST = 100.0
 _LOWEST_RATE, _HIGHEST_RATE = 1_000, 1_000_000
 
@@ -16,8 +16,8 @@ def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str)
 
     Args:
         samples: one channel, signed integers of any width (scaled to -1 to 1) or floating-point numbers.
-        rate: theirs, Hz.
-        place: what errors name: the file and the array.
+        rate: of the samples, Hz.
+        place: for error messages: the file and the array.
 
     Raises:
         InputError: of another shape or type, empty, with NaN or infinities, silent, or not scaled to -1 to 1.
@@ -43,7 +43,7 @@ def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str)
         raise InputError(f"{place}: is silent (its peak is below -70 dB of full scale); leave this recording out.")
     if rate == sample_rate:
         return sound
-    import soxr  # takes a while to load, and many sets need none of it
+    import soxr  # slow to load, and many data sets do without
 
     length = max(1, round(len(sound) * sample_rate / rate))
     result = np.asarray(soxr.resample(sound, rate, sample_rate, quality="HQ"), np.float32)[:length]

@@ -4,18 +4,18 @@ Layout after TalkSHOW's ``dataset_preprocess.py``: ``<speaker>/<video>/<train|va
 downloaded there is no folder of the split, and in SHOW's own archives none of the sequence. 30 frames a second, up to
 10 s each; keys and shapes of the pickles from SHOW's README.
 
-What is made of them:
+How they are read:
 
-- The 22 body joints (``global_orient`` and ``body_pose_axis``). Each hand comes as 12 principal components of MANO's
-  basis, which is licensed and not here: fingers cannot be decoded and are left out. ``betas`` are ignored.
+- The 22 body joints (``global_orient`` and ``body_pose_axis``). Each hand has 12 principal components of MANO's
+  basis, whose licence forbids redistribution: fingers cannot be decoded and are left out. ``betas`` are ignored.
 - Poses are in the camera's frame, y down: ``global_orient`` is near half a turn about x (TalkSHOW's ``lower_body.py``
-  sits its speakers down with (3.0747, -0.0158, -0.0152)). The world is turned by half a turn about x so that y is up
-  and the speaker looks along z; a file whose pelvis is upright already is left.
-- Where the floor is, nobody knows (the camera shows upper bodies): the pelvis of the first frame is put over the
-  origin at the height of the rest skeleton's.
+  seats its speakers with (3.0747, -0.0158, -0.0152)). The world is turned by half a turn about x so that y is up
+  and the speaker looks along z; a file whose pelvis is upright already is not turned.
+- The height of the floor is unknown (the camera shows upper bodies): the pelvis of the first frame is put over the
+  origin, at its height in the rest skeleton.
 - Legs are guesses of the fit. SHOW's README advises to fix them, as well as orientation and translation; that is
-  left to whoever trains.
-- Takes with NaN are refused, as TalkSHOW drops them.
+  left to the user.
+- Takes with NaN raise an error; TalkSHOW drops them.
 """
 
 from dataclasses import replace
@@ -64,7 +64,7 @@ def read(take: Take, sample_rate: int) -> Recording:
     """Speech and the motion of the 22 body joints.
 
     Raises:
-        InputError: a file is missing or damaged, or a pose is not as SHOW's README says.
+        InputError: a file is missing or damaged, or a pose differs from SHOW's README.
     """
     audio, path = take.sources
     speech = read_audio(audio, sample_rate)
@@ -86,7 +86,7 @@ def read(take: Take, sample_rate: int) -> Recording:
     pose = np.concatenate([arrays["global_orient"][:, None], arrays["body_pose_axis"]], axis=1)
     motion = smplx_motion(pose, arrays["transl"], FPS, path)
     rotations, root = np.array(motion.rotations), np.array(motion.root, np.float64)
-    if np.mean(rotations[:, 0, 1, 1]) < 0.0:  # how far up the pelvis' own up points
+    if np.mean(rotations[:, 0, 1, 1]) < 0.0:  # the vertical component of the pelvis' up axis
         rotations[:, 0] *= _OVER[:, None].astype(np.float32)
         root = root * _OVER
     root += np.array([0.0, PELVIS_HEIGHT, 0.0]) - root[0]
@@ -111,6 +111,6 @@ DATASET = DataSet(
         "From talkshow.is.tue.mpg.de after registration, for non-commercial research. Folders"
         " <speaker>/<video>/<split>/<seq>/ with a .wav and a .pkl each; the split is official where"
         " the folders of TalkSHOW's split are there."
-        " 22 body joints; fingers come as components of a licensed basis and are left out."
+        " 22 body joints; fingers are components of a licensed basis and are left out."
     ),
 )

@@ -1,7 +1,7 @@
-"""Motion from SMPL-X parameters, on a body of our own.
+"""Motion from SMPL-X parameters, on the talker's skeleton.
 
-SMPL-X (Pavlakos et al. 2019, "Expressive Body Capture") may not be shipped, so its joints at rest, which depend on the
-shape ``betas``, are not known here: bones are those of the talker's average adult
+SMPL-X (Pavlakos et al. 2019, "Expressive Body Capture") may not be redistributed, so its joints at rest, which depend
+on the shape ``betas``, are not available: bones are those of the talker's average adult
 (:data:`~a2g_jax.talker.skeleton.TALKER_HANDS_SKELETON`), which has SMPL-X's joints, order, tree and T-pose. Rotations
 are therefore exact and positions approximate; ``betas`` are ignored.
 """
@@ -19,9 +19,9 @@ BODY, FACE, HANDS = slice(0, 22), slice(22, 25), slice(25, 55)
 #: The pelvis at rest from the model's origin, which lies at the chest: about this, metres, for an average shape. A
 #: posed body is ``R (x - pelvis) + pelvis + trans`` (README of the smplx package), so the pelvis is at pelvis + trans.
 PELVIS_AT_REST = (0.0, -0.35, 0.0)
-#: Longest rotation vector that is one: several turns are a sign of degrees.
+#: Longest rotation vector, radians: several turns are a sign of degrees.
 _LARGEST_TURN = 4.0 * np.pi
-#: Metres from the origin beyond which a translation is in another unit.
+#: Largest distance from the origin, metres: larger ones are a sign of another unit.
 _FARTHEST = 1000.0
 
 
@@ -33,10 +33,10 @@ def smplx_motion(
     Args:
         rotations: rotation vectors, radians, of 22 or 52 joints in SMPL-X's order without jaw and eyes.
         translation: the model's ``trans``, metres, in a world with y up.
-        place: what errors name.
+        place: for error messages.
 
     Raises:
-        InputError: no frames, numbers that are not finite, or angles or places in other units.
+        InputError: no frames, numbers that are not finite, or angles or positions in other units.
     """
     if len(rotations) == 0:
         raise InputError(f"{place}: holds no frames; leave this recording out.")
@@ -69,8 +69,8 @@ def float_array(value: object, shapes: tuple[tuple[int, ...], ...], place: str) 
     """``value``, an array or a list of rows, as float64 numbers of ``(T, *shape)`` with the first of the shapes.
 
     Args:
-        shapes: what a row of it may be.
-        place: what errors name.
+        shapes: allowed shapes of a row.
+        place: for error messages.
 
     Raises:
         InputError: not numbers, or of another shape.

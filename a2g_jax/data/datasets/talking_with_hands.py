@@ -2,8 +2,8 @@
 
 Layout: the README of the 2023 data (github.com/genea-workshop/genea_challenge_2023, ``dataset``), and for 2022
 ``process_data.py`` of the IVI Lab's entry. Words are those of the TSV files, where an entry may be several words; a
-file without any means that the speaker says nothing. The root joint is ``body_world``, which carries the path of the
-body (the challenges' visualizer copies the place of no other joint); every other joint has a position too, which
+file without any is that of a silent speaker. The root joint is ``body_world``, which holds the path of the
+body (the challenges' visualizer copies the position of no other joint); every other joint has a position too, which
 :func:`~a2g_jax.io.bvh.read_bvh` takes for its bone.
 """
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from a2g_jax.data.datasets.csv_tables import read_cells
-from a2g_jax.data.datasets.named_files import require
+from a2g_jax.data.datasets.named_files import NamedFiles, files_by_name, list_files, require, without_motion
 from a2g_jax.data.datasets.source import Take
 from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
@@ -21,8 +21,8 @@ from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.transcripts import read_transcript
 
-SPLITS = {"trn": "train", "val": "validation", "tst": "test"}
-SUFFIXES = (".bvh", ".wav", ".tsv")
+_SPLITS = {"trn": "train", "val": "validation", "tst": "test"}
+_SUFFIXES = (".bvh", ".wav", ".tsv")
 _FINGERS = {"finger_incl": True, "fingers_incl": True, "finger_excl": False, "fingers_excl": False}
 
 
@@ -35,15 +35,53 @@ class Row(NamedTuple):
 
     @property
     def place(self) -> str:
-        """For messages."""
+        """File and line, for messages."""
         return f"{self.path}, line {self.line}"
 
 
-def read_metadata(files: Sequence[Path], name: re.Pattern[str], columns: Sequence[str]) -> dict[str, Row]:
-    """The rows of every metadata table, by the recording's name in their first cell; headers are read over.
+class Release(NamedTuple):
+    """Files and metadata of one challenge."""
+
+    files: NamedFiles
+    rows: dict[str, Row]
+    """Metadata by the recording's name, without the role in the conversation."""
+    with_motion: list[str]
+    """Names of the recordings, sorted, without the test recordings that were released without motion."""
+
+
+def find_release(folder: Path, year: int, columns: Sequence[str], expected: str, roles: Sequence[str] = ()) -> Release:
+    """The recordings of a challenge's release; their splits are the first part of their names.
+
+    Args:
+        columns: of the metadata.
+        expected: the folder to name instead, for messages.
+        roles: ends of the recordings' names, where both speakers of a conversation share one row. The test motion of
+            the first may be missing.
 
     Raises:
-        InputError: a row with another number of cells, another name, or a name that stood before.
+        InputError: no recordings of that year, none with motion, or recordings and metadata that do not match.
+    """
+    conversation = re.compile(rf"({'|'.join(_SPLITS)})_{year}_v[0-9]+_[0-9]{{3}}")
+    pattern = re.compile(rf"({conversation.pattern})_({'|'.join(roles)})") if roles else conversation
+    found = list_files(folder, expected)
+    files = files_by_name(found, lambda stem: stem if pattern.fullmatch(stem) else None, _SUFFIXES)
+    if not files:
+        raise InputError(f"{folder}: holds no recordings of the GENEA Challenge {year}; name {expected}.")
+    rows = _read_metadata(found, conversation, columns)
+    in_row = {(name.rpartition("_")[0] if roles else name): min(group.values()) for name, group in files.items()}
+    _check_rows(in_row, rows, folder)
+    left_out = without_motion(files, lambda name: name.startswith("tst") and name.endswith(tuple(roles[:1]) or ""))
+    with_motion = [name for name in files if name not in left_out]
+    if not with_motion:
+        raise InputError(f"{folder}: none of its {len(left_out)} recordings has motion; name {expected}.")
+    return Release(files, rows, with_motion)
+
+
+def _read_metadata(files: Sequence[Path], name: re.Pattern[str], columns: Sequence[str]) -> dict[str, Row]:
+    """The rows of every metadata table, by the recording's name in their first cell; headers are skipped.
+
+    Raises:
+        InputError: a row with another number of cells, another name, or the name of an earlier row.
     """
     result: dict[str, Row] = {}
     for path in files:
@@ -60,7 +98,7 @@ def read_metadata(files: Sequence[Path], name: re.Pattern[str], columns: Sequenc
                 raise InputError(f"{row.place}: expected {', '.join(columns)}; got {', '.join(cells)[:80]!r}.")
             other = result.setdefault(cells[0], row)
             if other is not row:
-                raise InputError(f"{row.place}: {cells[0]} stands in {other.place} already; remove one.")
+                raise InputError(f"{row.place}: {cells[0]} is in {other.place} already; remove one.")
     return result
 
 
@@ -71,30 +109,31 @@ def has_fingers(row: Row, cell: str) -> bool:
     return _FINGERS[cell.lower()]
 
 
-def check_rows(named: dict[str, Path], rows: dict[str, Row], folder: Path) -> None:
+def _check_rows(named: dict[str, Path], rows: dict[str, Row], folder: Path) -> None:
     """Each recording has a row, and each row a recording.
 
     Args:
-        named: a file of each recording, by the name that the metadata has for it.
+        named: a file of each recording, by its name in the metadata.
 
     Raises:
-        InputError: names the file without a row, or the row without a file.
+        InputError: a file without a row, or a row without a file.
     """
     if not rows:
         raise InputError(f"{folder}: holds no metadata table, such as metadata.csv, which names the speakers; add it.")
-    if lonely := sorted(set(named) - set(rows)):
-        raise InputError(f"{named[lonely[0]]}: has no row in {next(iter(rows.values())).path.name}; add or remove it.")
-    if lonely := sorted(set(rows) - set(named)):
-        raise InputError(f"{rows[lonely[0]].place}: there is no file of {lonely[0]}; add it or remove the row.")
+    if unmatched := sorted(set(named) - set(rows)):
+        table = next(iter(rows.values())).path.name
+        raise InputError(f"{named[unmatched[0]]}: has no row in {table}; add or remove it.")
+    if unmatched := sorted(set(rows) - set(named)):
+        raise InputError(f"{rows[unmatched[0]].place}: there is no file of {unmatched[0]}; add it or remove the row.")
 
 
-def make_take(name: str, files: dict[str, Path], split: str, annotations: dict[str, object], speaker: str) -> Take:
+def make_take(release: Release, name: str, speaker: str, annotations: dict[str, object]) -> Take:
     """A take that :func:`read` reads."""
     sources = tuple(
-        str(require(files, suffix, f"{kind} file"))
+        str(require(release.files[name], suffix, f"{kind} file"))
         for suffix, kind in ((".wav", "WAV"), (".bvh", "BVH"), (".tsv", "TSV"))
     )
-    return Take(name, sources, split, {"speaker": speaker, "annotations": annotations})
+    return Take(name, sources, _SPLITS[name[:3]], {"speaker": speaker, "annotations": annotations})
 
 
 def read(take: Take, sample_rate: int) -> Recording:

@@ -2,7 +2,7 @@
 
 Layout and times: :mod:`~a2g_jax.data.datasets.ted_lmdb`. 10 joints, read as the unit directions of 9 bones (27 values)
 in the axes of the file: y down, the speaker's left at -x. Nothing is subtracted; the authors' code subtracts the mean
-direction when it cuts its samples. Frames without a skeleton are bridged for up to half a second.
+direction when it cuts its samples. Gaps of up to half a second without a skeleton are bridged.
 """
 
 from pathlib import Path

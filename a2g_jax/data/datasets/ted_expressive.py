@@ -3,10 +3,10 @@
 TED's talks with fingers: 43 joints fitted by ExPose, read as the unit directions of 42 bones (126 values) in the axes
 of the camera: y down, the speaker's left at +x, z away from the camera. Two layouts:
 
-- LMDB databases as of TED Gesture (:mod:`~a2g_jax.data.datasets.ted_lmdb`), with their official split.
-- One ``.npz`` a clip, as others have cut them: ``dir_vec`` (N, 126), ``audio`` (int16), ``sr``, ``fps`` (15 where it
+- LMDB databases as in TED Gesture (:mod:`~a2g_jax.data.datasets.ted_lmdb`), with their official split.
+- One ``.npz`` a clip, as published by others: ``dir_vec`` (N, 126), ``audio`` (int16), ``sr``, ``fps`` (15 where it
   is missing) and ``sentence``, which has no times and is kept in ``annotations``. They have no official split. A name
-  that begins with the 11 characters of a YouTube video and three numbers tells the talk, which stands for the speaker.
+  of the 11 characters of a YouTube video and three numbers gives the talk, which serves as the speaker.
 """
 
 import re
@@ -32,7 +32,7 @@ _EXPECTED = (
 )
 _VIDEO = re.compile(r"([\w-]{11})_\d+_\d+_\d+")
 _LIMITS = Limits(size=2**28)
-#: How far from 1 the length of a direction may be; vectors with the mean subtracted are further off.
+#: Tolerance of the length of a direction; vectors with the mean subtracted exceed it.
 _ROUNDING = 0.01
 
 
@@ -52,7 +52,7 @@ def read(take: Take, sample_rate: int) -> PoseRecording:
     """Speech, words (of LMDB clips) and directions of 42 bones.
 
     Raises:
-        InputError: damaged, an array is missing or of another shape, or directions that are no unit vectors.
+        InputError: damaged, an array missing or of another shape, or directions that are not unit vectors.
     """
     if "key" in take.spec:
         return read_clip(take, sample_rate, TED_EXPRESSIVE_LAYOUT)

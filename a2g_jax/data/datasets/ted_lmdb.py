@@ -5,14 +5,14 @@ Layout: ``lmdb_train``, ``lmdb_val`` and ``lmdb_test`` (or ``train``, ``val``, `
 [[word, start, end]], "skeletons_3d", "audio_raw", "audio_feat", "start_frame_no", "end_frame_no", "start_time",
 "end_time"}`` (``data_preprocessor.py`` of Yoon et al. 2020, ``make_ted_dataset.py`` of Liu et al. 2022).
 
-- Times, of words too, are seconds from the start of the video. Here words are moved to the start of the clip and cut
+- Times, of words too, are seconds from the start of the video. Here words are relative to the start of the clip and cut
   at its ends; words that the authors' cleaning left empty are dropped.
-- The frames last from ``start_time`` to ``end_time`` (so their code resamples them), which says their rate: a usual one
-  that fits within a frame. ``audio_raw`` has 16 kHz.
-- The talk is the speaker. TED-Expressive's authors deal the clips of each talk out to the three parts, so its official
-  split has all speakers in each.
+- The frames last from ``start_time`` to ``end_time`` (their code resamples them so), which gives their rate: the usual
+  one that fits within a frame. ``audio_raw`` has 16 kHz.
+- The talk is the speaker. TED-Expressive's authors distribute the clips of each talk over the three parts, so each part
+  of its official split has all speakers.
 
-A database may be larger than the memory; one video is held at a time.
+A database may be larger than the memory; one video is in memory at a time.
 """
 
 import math
@@ -39,13 +39,13 @@ from a2g_jax.io.untrusted import Limits, LmdbFile, decode_arrow
 from a2g_jax.io.words import Word
 
 AUDIO_RATE = 16000
-#: Most memory that one video may take: an hour with poses, speech and mels takes about 400 MB.
+#: Limit on the memory of one video: an hour with poses, speech and mels takes about 400 MB.
 _LIMITS = Limits(size=2 * 2**30)
 _LONGEST_CLIP = 4 * 3600.0
 
 
 def databases(folder: Path) -> dict[str, Path]:
-    """The database of each part of the split, by its official name; of a folder that is a database, that one."""
+    """The database of each part of the official split; only one if the folder itself is a database."""
     if (folder / "data.mdb").is_file():
         return {SPLIT_NAMES.get(folder.name.removeprefix("lmdb_"), ""): folder / "data.mdb"}
     found: dict[str, Path] = {}
@@ -75,7 +75,7 @@ def read_clip(take: Take, sample_rate: int, layout: PoseLayout) -> PoseRecording
     """A clip with the directions of the bones of ``layout``.
 
     Raises:
-        InputError: the video is damaged, or the clip is not as described above, with its place.
+        InputError: the video is damaged, or the clip differs from the above layout; the message gives its place.
     """
     path, key, number = Path(take.sources[0]), bytes.fromhex(take.spec["key"]), take.spec["clip"]
     place = f"{path}, key {_text(key)}, clip {number}"
@@ -131,8 +131,8 @@ def _video_of(value: bytes, place: str) -> tuple[str, list[dict[str, Any]]]:
     name = video.get("vid") if isinstance(video, dict) else None
     if not isinstance(name, str) or not isinstance(clips, list) or any(not isinstance(clip, dict) for clip in clips):
         raise InputError(
-            f"{place}: expected a video with 'vid' and 'clips', as in the databases that the authors offer; theirs of"
-            " samples that their code cuts from it (..._cache) are not read."
+            f"{place}: expected a video with 'vid' and 'clips', as in the authors' databases; those of the"
+            " samples that their code cuts (..._cache) are not read."
         )
     return re.sub(r"[^\w-]", "_", name)[:64], clips
 
@@ -151,7 +151,7 @@ def _words(clip: dict[str, Any], start: float, end: float, place: str) -> Iterat
 
 def _entry(clip: dict[str, Any], name: str, place: str) -> Any:
     if name not in clip:
-        raise InputError(f"{place}: has no {name!r}; expected a clip as in the databases that the authors offer.")
+        raise InputError(f"{place}: has no {name!r}; expected a clip as in the authors' databases.")
     return clip[name]
 
 

@@ -27,7 +27,7 @@ _TEST = frozenset({1, 25, 27, 30})
 
 
 def find(folder: Path) -> list[Take]:
-    """All recordings under the folder, under the names of one of the two releases."""
+    """All recordings under the folder, with the names of one of the two releases."""
     groups = files_by_name(list_files(folder, _EXPECTED), _name, (".bvh", ".wav", ".json"))
     groups = {name: files for name, files in groups.items() if not files.keys().isdisjoint((".bvh", ".wav"))}
     if not groups:
@@ -51,7 +51,7 @@ def find(folder: Path) -> list[Take]:
 
 
 def _name(stem: str) -> str | None:
-    # In one spelling: releases differ in case and in leading zeros.
+    # One spelling: releases differ in case and in leading zeros.
     if match := _GENEA.fullmatch(stem):
         return f"{'TestSeq' if match[1][0] in 'tT' else 'Recording_'}{int(match[2]):03d}"
     if match := _ORIGINAL.fullmatch(stem):
@@ -88,7 +88,7 @@ DATASET = DataSet(
     about=(
         "trinityspeechgesture.scss.tcd.ie, for research, after signing a licence; one speaker, 244 minutes. Name "
         "GENEA_Challenge_2020_data_release (its Test_data are the test set; left out, with a warning, where they come "
-        "without motion) or a folder of the original names, as BVH and in step with the audio (the test set is then "
+        "without motion) or a folder of the original names, as BVH in step with the audio (the test set is then "
         "Audio2Gestures': NaturalTalking 01, 25, 27 and 30). StyleGestures held out Recording_008."
     ),
 )

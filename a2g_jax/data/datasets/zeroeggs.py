@@ -38,7 +38,7 @@ class _Info:
 def find(folder: Path) -> list[Take]:
     """All takes of ``clean`` under the folder, or else all of ``original``, in the order of their names.
 
-    ``clean`` holds the same takes, cut and without the experimenter's voice; name ``original`` itself to read that.
+    ``clean`` holds the same takes, cut and without the experimenter's voice; for the others, name ``original`` itself.
     """
     files = list_files(folder, _EXPECTED)
     clean = files_by_name(files, lambda stem: stem if _CLEAN.fullmatch(stem) else None, (".bvh", ".wav"))
@@ -65,20 +65,20 @@ def _read_info(folder: Path, files: Sequence[Path], columns: Sequence[str]) -> d
         for line, cells in read_columns(path, columns):
             row = _Info(path, line, cells)
             if row.name in result:
-                raise InputError(f"{row.place}: {row.name} stands in {result[row.name].place} already; remove one.")
+                raise InputError(f"{row.place}: {row.name} is in {result[row.name].place} already; remove one.")
             result[row.name] = row
     return result
 
 
 def _clean_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
-    takes, there = [], set()
+    takes, found = [], set()
     for name, files in groups.items():
         match = _CLEAN.fullmatch(name)
         take, style, mirror, whole, tenth = match.groups() if match else ("", "", "", "", "")
         row = info.get(take)
         if info and row is None:
             raise InputError(f"{min(files.values())}: has no row in info.csv; add or remove it.")
-        there.add(take)
+        found.add(take)
         annotations: dict[str, object] = {"style": row.cells["style"] if row else style, "mirrored": bool(mirror)}
         if (whole, tenth) != ("1", "0"):
             annotations["stretch"] = float(f"{whole}.{tenth}")
@@ -86,22 +86,22 @@ def _clean_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
             annotations["session"] = row.cells["capture_session"]
         sources = (str(require(files, ".wav", "WAV file")), str(require(files, ".bvh", "BVH file")))
         takes.append(Take(name, sources, row.split if row else "", {"annotations": annotations}))
-    mirrors = any(name.endswith("_mirror") for name in there)
+    mirrors = any(name.endswith("_mirror") for name in found)
     for row in info.values():
-        if row.name not in there and (mirrors or not row.name.endswith("_mirror")):
+        if row.name not in found and (mirrors or not row.name.endswith("_mirror")):
             raise InputError(f"{row.place}: there is no file of {row.name}; add it or remove the row.")
     return takes
 
 
 def _original_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
-    known = set(info) | {row.audio for row in info.values()}
-    if lonely := sorted(set(groups) - known):
-        raise InputError(f"{min(groups[lonely[0]].values())}: has no row in info.csv; add or remove it.")
+    listed = set(info) | {row.audio for row in info.values()}
+    if unlisted := sorted(set(groups) - listed):
+        raise InputError(f"{min(groups[unlisted[0]].values())}: has no row in info.csv; add or remove it.")
     takes = []
     for name, row in sorted(info.items()):
         motion, speech = groups.get(name, {}), groups.get(row.audio, {})
-        for file, there, suffix in ((name, motion, ".bvh"), (row.audio, speech, ".wav")):
-            if suffix not in there:
+        for file, files, suffix in ((name, motion, ".bvh"), (row.audio, speech, ".wav")):
+            if suffix not in files:
                 raise InputError(f"{row.place}: there is no file {file}{suffix}; add it or remove the row.")
         sources = [str(speech[".wav"]), str(motion[".bvh"])] + ([str(speech[".csv"])] if ".csv" in speech else [])
         annotations = {
@@ -115,7 +115,7 @@ def _original_takes(groups: NamedFiles, info: dict[str, _Info]) -> list[Take]:
 
 
 def read(take: Take, sample_rate: int) -> Recording:
-    """A take. Annotations: ``style``, ``mirrored``, ``session`` of capture, and ``stretch`` of one played faster."""
+    """A take. Annotations: ``style``, ``mirrored``, ``session`` of capture, and ``stretch`` of takes played faster."""
     wav, bvh, *speech = (Path(source) for source in take.sources)
     audio, motion = read_audio(wav, sample_rate), read_bvh(bvh)
     if "times" in take.spec:
@@ -142,6 +142,6 @@ DATASET = DataSet(
     about=(
         "github.com/ubisoft/ubisoft-laforge-ZeroEGGS, CC BY-NC-ND 4.0; one speaker. Name the folder data: clean is "
         "read if it is there, else original, cut to the acting. The column validation of info.csv is the official "
-        "split (training and validation). Mirrored takes are told by the annotation mirrored."
+        "split (training and validation). Mirrored takes have the annotation mirrored."
     ),
 )

@@ -1,4 +1,4 @@
-"""The original takes of ZeroEGGS: where the acting lies in them, as the authors' ``data_pipeline.py`` cuts them."""
+"""The original takes of ZeroEGGS, cut to the acting as in the authors' ``data_pipeline.py``."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from a2g_jax.data.datasets.csv_tables import read_columns
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 
-#: Columns of info.csv and the frame rates that their timecodes (HH:MM:SS:FF) count in.
+#: Columns of info.csv and the frame rates of their timecodes (HH:MM:SS:FF).
 _RATES = {"audio_start_time": 30, "anim_start_time": 60, "acting_start_time": 60, "acting_end_time": 60}
 COLUMNS = tuple(_RATES)
 _TIMECODE = re.compile(r"([0-9]{1,2}):([0-9]{2}):([0-9]{2}):([0-9]{2})")
@@ -22,7 +22,7 @@ def times(place: str, cells: Mapping[str, str]) -> dict[str, int]:
     """Start of the acting in the audio and in the motion, and its length, in sixtieths of a second.
 
     Raises:
-        InputError: a cell that is no timecode, or acting before the recording or of no length.
+        InputError: a cell that is no timecode, or acting that starts before the recording or has no length.
     """
     at = {column: _sixtieths(f"{place}: {column}", cells[column], rate) for column, rate in _RATES.items()}
     start = at["acting_start_time"]
@@ -49,7 +49,7 @@ def _sixtieths(place: str, cell: str, rate: int) -> int:
 def cut_to_acting(
     audio: Float[np.ndarray, " N"], sample_rate: int, motion: Motion, at: Mapping[str, int], sources: Sequence[str]
 ) -> tuple[Float[np.ndarray, " M"], Motion]:
-    """Audio and motion from the start of the acting to its end, or to theirs.
+    """Audio and motion from the start of the acting to its end, or to their own end.
 
     Raises:
         InputError: one of them ends before the acting starts.
@@ -58,7 +58,7 @@ def cut_to_acting(
     for source, start, seconds in zip(sources, starts, lengths, strict=False):
         if start / 60 >= seconds:
             raise InputError(
-                f"{source}: lasts {seconds:.2f} s, and by info.csv the acting starts at {start / 60:.2f} s."
+                f"{source}: lasts {seconds:.2f} s, and the acting starts at {start / 60:.2f} s; correct info.csv."
             )
     first, stop = (round(tick * sample_rate / 60) for tick in (at["audio"], at["audio"] + at["length"]))
     begin, end = (round(tick * motion.fps / 60) for tick in (at["motion"], at["motion"] + at["length"]))
@@ -66,10 +66,10 @@ def cut_to_acting(
 
 
 def only_speaker(audio: Float[np.ndarray, " N"], sample_rate: int, marks: Path) -> Float[np.ndarray, " N"]:
-    """The audio with silence where the actress does not speak, so that the experimenter is not heard.
+    """The audio with silence where the actress does not speak, which removes the experimenter's voice.
 
     Args:
-        marks: the table beside the audio: rows whose ``#`` holds an R say where she speaks, ``Start`` to ``End`` as
+        marks: the table beside the audio: she speaks in the rows whose ``#`` holds an R, from ``Start`` to ``End`` as
             minutes:seconds.milliseconds.
 
     Raises:

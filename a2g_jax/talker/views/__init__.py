@@ -1,1 +1,1 @@
-"""The talker as the field's data sets show their speakers."""
+"""Views of generated recordings: the formats of the field's data sets."""

@@ -1,7 +1,7 @@
-"""What a capture does to a motion: jitter, pops and dropouts, as tracked markers and poses from video have them.
+"""Capture noise on a motion: jitter, pops and dropouts, as in tracked markers and poses from video.
 
 The talker itself moves smoothly. EmotionGesture's motion-smooth loss is meant for training data that jitter; here the
-jitter has a known size, and the motion without it is known too.
+size of the jitter is set, and the motion without it is available.
 """
 
 from dataclasses import replace
@@ -20,11 +20,11 @@ _WHITE = 0.3
 _POPS, _POP_SIZE = 0.4, 4.0
 """Pops a minute and joint at one degree, and their size in the joint's standard deviations."""
 _DROPOUTS, _DROPOUT_SECONDS = 0.4, (0.1, 0.35)
-"""Dropouts a minute and joint at one degree, and how long the joint then stands still."""
+"""Dropouts a minute and joint at one degree, and how long the joint then stays still, seconds."""
 
 
 def joint_weights(parents: tuple[int, ...]) -> Float[np.ndarray, " J"]:
-    """Noise of each joint relative to the strength: 0.3 at the root and 0.1 more for each joint between.
+    """Noise of each joint relative to the strength: 0.3 at the root and 0.1 more for each joint down the tree.
 
     Of the talker: pelvis 0.3, chest 0.6, elbows 0.9, wrists 1, last finger joints 1.3.
     """
@@ -35,12 +35,12 @@ def joint_weights(parents: tuple[int, ...]) -> Float[np.ndarray, " J"]:
 
 
 def add_jitter(motion: Motion, degrees: float, rng: np.random.Generator, skate: float = 0.0) -> Motion:
-    """A motion as captured: every joint's rotation with noise that is larger far from the root.
+    """The motion with capture noise on every joint's rotation, larger far from the root.
 
     Each joint is turned by a random rotation vector. Each of its three components has a standard deviation of
     ``degrees * joint_weights``, made of white noise (0.3 of the variance) and noise smoothed over 0.08 s (0.7). Pops,
-    single frames with four times that noise, and dropouts, in which a joint stands still for 0.1 to 0.35 s and then
-    jumps to where it should be, come 0.4 times a minute and joint for every degree.
+    single frames with four times that noise, and dropouts, in which a joint stays still for 0.1 to 0.35 s and then
+    jumps to its true rotation, come 0.4 times a minute and joint for every degree.
 
     At 30 frames per second the wrists' root-mean-square jerk (third difference of their position) grows by a factor of
     about 4 at half a degree, 7 at one, 18 at 2.5 and 35 at 5 degrees: means over one recording of each speaker; the
@@ -49,7 +49,7 @@ def add_jitter(motion: Motion, degrees: float, rng: np.random.Generator, skate: 
     Args:
         motion: on any skeleton.
         degrees: strength; 0 gives the motion itself.
-        rng: source of the noise; the same state gives the same noise, and what a joint gets does not depend on the
+        rng: source of the noise; the same state gives the same noise, and that of a joint does not depend on the
             joints after it.
         skate: standard deviation, metres, of a slow drift (1 s) of the root over the floor: feet slide by as much.
 
@@ -83,8 +83,8 @@ def _capture(
     pops = rng.random(frames) < _POPS * degrees / 60.0 / fps
     vectors[pops] = _POP_SIZE * rng.standard_normal((int(pops.sum()), 3))
     captured = rotations @ Rotation.from_rotvec(np.deg2rad(spread) * vectors).as_matrix()
-    held = _dropouts(rng, frames, degrees, fps)
-    return captured[np.maximum.accumulate(np.where(held, 0, np.arange(frames)))]
+    lost = _dropouts(rng, frames, degrees, fps)
+    return captured[np.maximum.accumulate(np.where(lost, 0, np.arange(frames)))]
 
 
 def _dropouts(rng: np.random.Generator, frames: int, degrees: float, fps: float) -> Bool[np.ndarray, " T"]:
@@ -101,7 +101,7 @@ def _dropouts(rng: np.random.Generator, frames: int, degrees: float, fps: float)
 def _smooth_noise(
     rng: np.random.Generator, frames: int, channels: int, fps: float, seconds: float = 1.0
 ) -> Float[np.ndarray, "T C"]:
-    """Gaussian noise of standard deviation 1, smoothed by a Gaussian window of ``seconds`` (its deviation)."""
+    """Gaussian noise of standard deviation 1, smoothed by a Gaussian window of ``seconds`` (its standard deviation)."""
     width = seconds * fps
     margin = int(np.ceil(4.0 * width))
     white = rng.standard_normal((frames + 2 * margin, channels))

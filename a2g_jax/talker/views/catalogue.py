@@ -1,4 +1,4 @@
-"""The talker as the field's data sets show their speakers: :data:`VIEWS`, by the name of the data set."""
+"""Views of generated recordings by the name of the data set whose format they have: :data:`VIEWS`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,17 +16,17 @@ from a2g_jax.talker.views.upper_body import upper_body_recording
 
 @dataclass(frozen=True)
 class View:
-    """How a data set shows a speaker."""
+    """The format of a data set's recordings."""
 
     title: str
     fps: float
     """Its rate, frames per second."""
     pose: str
-    """The representation of a corpus of it."""
+    """Representation of its poses."""
     fingers: bool
-    """Whether the talker must have fingers for it."""
-    look: Callable[[Recording, float], Recording | PoseRecording]
-    """A generated recording as the data set would have it, at a rate."""
+    """Whether it needs a motion with fingers."""
+    convert: Callable[[Recording, float], Recording | PoseRecording]
+    """A generated recording in that format, at a rate in frames per second."""
 
 
 def _whole(recording: Recording, _fps: float) -> Recording:
@@ -76,7 +76,7 @@ VIEWS: dict[str, View] = {
 
 
 def find_view(name: str) -> View:
-    """A view by its name.
+    """The view of that name.
 
     Raises:
         InputError: there is none of that name.

@@ -1,4 +1,4 @@
-"""The talker as the TED data sets have people: unit directions of bones, at 15 frames per second.
+"""View in the format of the TED data sets: unit directions of bones, at 15 frames per second.
 
 Two layouts. ``TED`` (Yoon et al. 2020, "Speech Gesture Generation from the Trimodal Context"): 10 joints, 9 bones, 27
 values. ``TED_EXPRESSIVE`` (Liu et al. 2022, "Learning Hierarchical Cross-Modal Association for Co-Speech Gesture
@@ -21,9 +21,9 @@ class BoneLayout:
     """Joints, the bones between them in the order of the data, and the axes."""
 
     points: tuple[str, ...]
-    """The talker's point that each joint is."""
+    """The talker's landmark at each joint."""
     bones: tuple[tuple[int, int], ...]
-    """From and to which joint; a joint is reached before anything starts from it."""
+    """Start and end joint; a joint is the end of a bone before it is the start of another."""
     lengths: tuple[float, ...]
     """Lengths of the bones that the data set's authors use to draw poses, metres."""
     axes: tuple[float, float, float]
@@ -105,7 +105,7 @@ def directions_from_positions(positions: Float[np.ndarray, "T P 3"], layout: Bon
 def directions(motion: Motion, layout: BoneLayout, fps: float = 15.0) -> Float[np.ndarray, "T V"]:
     """The view: 27 (:data:`TED`) or 126 (:data:`TED_EXPRESSIVE`) values a frame.
 
-    The loaders of both data sets subtract the mean over their training set; that is left to them.
+    The loaders of both data sets subtract the mean over their training set; this view does not.
 
     Args:
         motion: of the talker; with fingers for TED-Expressive.

@@ -1,4 +1,4 @@
-"""The talker as a video shows it: Speech2Gesture's 49 two-dimensional keypoints at 15 frames per second.
+"""View in the format of Speech2Gesture: 49 two-dimensional keypoints at 15 frames per second.
 
 The layout of Ginosar et al. 2019 ("Learning Individual Styles of Conversational Gesture"), after their removal of nose
 and eyes: 0 neck (the middle of the shoulders, as OpenPose has it), 1 to 3 right shoulder, elbow and wrist, 4 to 6 the
@@ -37,7 +37,7 @@ def _names() -> tuple[str, ...]:
 
 
 KEYPOINTS = _names()
-"""Which point of the talker each of the 49 is; wrists come twice, as the end of an arm and as the start of a hand."""
+"""The talker's landmark at each of the 49; wrists come twice, as the end of an arm and as the start of a hand."""
 
 
 def _bones() -> tuple[tuple[int, int], ...]:
@@ -51,7 +51,7 @@ def _bones() -> tuple[tuple[int, int], ...]:
 
 
 KEYPOINT_BONES = _bones()
-"""Pairs of keypoints that a drawing joins."""
+"""Pairs of keypoints to be joined in a drawing."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +96,12 @@ def keypoints(motion: Motion, fps: float = 15.0, camera: Camera = Camera()) -> F
 
 @dataclass(frozen=True)
 class Detector:
-    """How a keypoint detector errs; the defaults are mild.
+    """Error model of a keypoint detector; the defaults are mild.
 
     A keypoint's error is the sum of jitter that is new in every frame and of a wobble smoothed over three frames, each
     of half the variance. Its standard deviation is ``jitter`` at rest (twice that for hands) and grows by ``blur``
-    times the way the point goes in a frame. A point is lost for a frame with probability ``loss`` (three times that
-    for hands), twice that for a point that goes 30 pixels; it then stays where it was last seen, with confidence 0.
+    times the path of the point in a frame. A point is lost for a frame with probability ``loss`` (three times that
+    for hands), twice that for a point that goes 30 pixels; it then stays at its last position, with confidence 0.
     """
 
     jitter: float = 0.6
@@ -130,8 +130,8 @@ class Detector:
         lost = rng.random(points.shape[:2]) < self.loss * (2.0 * hand - 1.0) * (1.0 + speed / 30.0)
         lost[0], lost[:, 0] = False, False
         error[:, 0] = 0.0
-        seen = np.maximum.accumulate(np.where(lost, 0, np.arange(frames)[:, None]), axis=0)
-        noisy = np.take_along_axis(points + error, seen[..., None], axis=0)
+        detected = np.maximum.accumulate(np.where(lost, 0, np.arange(frames)[:, None]), axis=0)
+        noisy = np.take_along_axis(points + error, detected[..., None], axis=0)
         confidence = 1.0 / (1.0 + np.linalg.norm(error, axis=-1) / 10.0)
         return noisy, np.where(lost, 0.0, confidence)
 
@@ -145,13 +145,13 @@ def write_s2g_windows(
     fps: float = 15.0,
     stride: int = 5,
 ) -> list[Path]:
-    """Write training examples as Speech2Gesture's own preparation lays them out.
+    """Write training examples in the layout of Speech2Gesture's own preparation.
 
     Each ``<name>-<first frame>.npz`` holds ``pose`` (64, 2, 49) in pixels and ``audio``, the 16 kHz samples from the
     time of its first frame to that of its last one: 67200 at 15 frames per second.
 
     Args:
-        stride: frames between the starts of two examples; Speech2Gesture takes 5.
+        stride: frames between the starts of two examples; 5 in Speech2Gesture.
 
     Returns:
         The files, in order; none where there are fewer than 64 frames.

@@ -1,4 +1,4 @@
-"""Named points of the talker in the world: joints, finger tips and the face, which the views are made of."""
+"""Named points of the talker in the world, from which the views are made: joints, finger tips and the face."""
 
 import numpy as np
 from jaxtyping import Float
@@ -27,7 +27,7 @@ def require_fingers(motion: Motion) -> None:
 
 
 def landmarks(motion: Motion) -> dict[str, Float[np.ndarray, "T 3"]]:
-    """Positions in the world, metres, of every joint and of the points that are no joints.
+    """Positions in the world, metres, of every joint and of further points.
 
     Those are, by name, ``"Nose"``, ``"R_Eye"``, ``"L_Eye"``, ``"R_Ear"``, ``"L_Ear"``, and for each joint that has an
     end site ``"<joint>_End"``: the crown (``"Head_End"``) and the finger tips (``"L_Index3_End"``).

@@ -1,12 +1,12 @@
-"""The talker as BEAT records people: EmotionGesture's 47 upper-body joints at 15 frames per second.
+"""View in the format of BEAT: EmotionGesture's 47 upper-body joints at 15 frames per second.
 
 BEAT (Liu et al. 2022, "BEAT: A Large-Scale Semantic and Emotional Multi-Modal Dataset") has 75 joints, of which
 EmotionGesture predicts 47: Spine, Neck, Neck1, and shoulder, arm, forearm, hand and 18 finger joints a side, as 6D
 rotations: 282 values a frame.
 
-What is called Spine here is the talker's chest joint (Spine3), from which neck and shoulders hang rigidly; BEAT's own
-47 joints leave out the vertebrae between, and with them the place of everything above. Neck1 is the talker's Head. The
-ring, pinky and index fingers have a metacarpal joint in the palm that never turns against the hand.
+What is called Spine here is the talker's chest joint (Spine3), to which neck and shoulders are rigidly attached; BEAT's
+own 47 joints leave out the vertebrae between, and with them the position of everything above. Neck1 is the talker's
+Head. The ring, pinky and index fingers have a metacarpal joint in the palm that never turns against the hand.
 """
 
 import math
@@ -23,8 +23,8 @@ from a2g_jax.talker.views.landmarks import require_fingers
 
 _FINGERS = {"M": "Middle", "R": "Ring", "P": "Pinky", "I": "Index", "T": "Thumb"}
 _METACARPALS = ("R", "P", "I")
-_CARRIERS = {"P": "R", "T": "I"}
-"""In BEAT's tree the little finger hangs on the ring finger's metacarpal joint, the thumb on the index finger's."""
+_PARENTS = {"P": "R", "T": "I"}
+"""In BEAT's tree the little finger's parent is the ring finger's metacarpal joint, the thumb's the index finger's."""
 _METACARPAL = (0.03, 0.6, 0.55)
 """Place of a metacarpal joint between wrist and knuckle, as shares along each axis: BEAT's, about."""
 
@@ -40,7 +40,7 @@ def _tree() -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
             above = side + name
         hand = above
         for letter, finger in _FINGERS.items():
-            above = hand + _CARRIERS.get(letter, "")
+            above = hand + _PARENTS.get(letter, "")
             if letter in _METACARPALS:
                 rows.append((hand + letter, above, ""))
                 above = hand + letter
@@ -54,7 +54,7 @@ def _tree() -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
 
 
 UPPER_BODY_JOINTS, UPPER_BODY_PARENTS, SOURCES = _tree()
-"""BEAT's names of the 47 joints in BEAT's order, their parents, and the talker's joint that each one is.
+"""BEAT's names of the 47 joints in BEAT's order, their parents, and the talker's joint for each.
 
 ``SOURCES`` is empty for the six metacarpal joints, which the talker does not have.
 """
@@ -69,7 +69,7 @@ def upper_body_skeleton(source: Skeleton) -> Skeleton:
         elif not name:
             # A metacarpal joint comes right before its knuckle.
             offsets[joint] = source.offsets[source.index(SOURCES[joint + 1])] * _METACARPAL
-    # So far knuckles and metacarpal joints are placed from the wrist; metacarpal joints are turned as the hand is.
+    # So far both knuckles and metacarpal joints are relative to the wrist; metacarpal joints turn with the hand.
     from_wrist = offsets.copy()
     for joint, above in enumerate(UPPER_BODY_PARENTS):
         if joint and not SOURCES[above]:
@@ -80,7 +80,7 @@ def upper_body_skeleton(source: Skeleton) -> Skeleton:
 
 
 def upper_body(motion: Motion, fps: float = 15.0) -> Motion:
-    """The motion of the 47 joints: each is where the talker's own joint is, and turned as it is.
+    """The motion of the 47 joints, with the positions and rotations of the talker's own.
 
     Args:
         motion: of the talker with fingers.
@@ -117,13 +117,13 @@ def pose_values(motion: Motion) -> Float[np.ndarray, "T values"]:
 
 
 def upper_body_recording(recording: Recording, fps: float = 15.0) -> Recording:
-    """A generated recording as BEAT has it: the motion of :func:`upper_body` and what is said in its frames.
+    """A generated recording in BEAT's format: the motion of :func:`upper_body`, and words and syllables by frame.
 
     Audio, words, speaker, emotion and annotations stay; ``annotations["frames"]`` gains ``fps`` and the ``words`` and
     ``syllables`` as lists ``[text, first, stop]``: the frames from ``first`` up to but not including ``stop``. Edges
-    are moved to the nearest frame time, and nothing is shorter than one frame, so neighbours may share one.
+    are moved to the nearest frame time, and nothing is shorter than one frame, so neighbours may share a frame.
 
-    Draw other right motions from the recording it was made of, and take :func:`upper_body` of each.
+    For other valid motions, draw them from the original recording and take :func:`upper_body` of each.
 
     Raises:
         InputError: the recording's motion has no fingers.

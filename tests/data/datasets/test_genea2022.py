@@ -97,7 +97,7 @@ def test_tables_with_headers_marks_and_spaces(tmp_path, text, encoding):
         ),
         ("val_2022_v1_000,maybe,3\n", "line 1: expected fingers_incl or fingers_excl; got 'maybe'"),
         ("val_2022_v1_000,finger_incl,3\nsomething,finger_incl,3\n", r"line 2: expected name, .*; got 'something"),
-        ("val_2022_v1_000,finger_incl,3\n" * 2, r"line 2: val_2022_v1_000 stands in .*line 1 already"),
+        ("val_2022_v1_000,finger_incl,3\n" * 2, r"line 2: val_2022_v1_000 is in .*line 1 already"),
         (b"val_2022_v1_000,finger_incl,\xff\xfe", r"val_metadata\.csv: is not UTF-8 text"),
         (b"val_2022_v1_000,finger_incl,3\0", "is binary, not text"),
         ('val_2022_v1_000,finger_incl,"3\n', "line 1: is damaged|line 2: is damaged"),

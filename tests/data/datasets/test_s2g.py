@@ -143,7 +143,7 @@ def test_wrong_folders_and_tables(tmp_path):
         DATASET.find(tmp_path)
     (tmp_path / "train.csv").unlink()
     (tmp_path / "oliver" / "train" / "npz" / "stray.npz").write_bytes(b"x")
-    with pytest.raises(InputError, match="stray.npz: its name tells no interval"):
+    with pytest.raises(InputError, match="stray.npz: its name has no interval"):
         DATASET.find(tmp_path)
 
 
@@ -153,7 +153,7 @@ def test_wrong_folders_and_tables(tmp_path):
         (lambda pose, audio: {"pose": pose, "sound": audio}, "has no array 'audio'"),
         (lambda pose, audio: {"pose": pose[:, :, :40], "audio": audio}, r"pose: expected numbers of shape"),
         (lambda pose, audio: {"pose": pose, "audio": np.array(["a"])}, "audio <U1 of shape"),
-        (lambda pose, audio: {"pose": pose + 1, "audio": audio}, "is no continuation of"),
+        (lambda pose, audio: {"pose": pose + 1, "audio": audio}, "does not continue"),
         (lambda pose, audio: {"pose": pose, "audio": audio.reshape(2, -1)}, r"audio float32 of shape \(2, "),
         (lambda pose, audio: {"pose": pose, "audio": audio * np.nan}, "audio: holds NaN"),
         (None, "is not an .npz archive"),

@@ -108,9 +108,9 @@ def test_the_experimenter_is_silenced(tmp_path):
     _, sounds = write_original(tmp_path)
     put(tmp_path / "original" / "005_Sad_4.csv", "#,Name,Start,End\nM1,x,0:00.000,0:03.000\nR1,x,0:01.500,0:01.750\n")
     recording = zeroeggs.read(zeroeggs.find(tmp_path)[2], 48000)
-    heard = np.zeros(72000, np.float32)
-    heard[24000:36000] = sounds["005_Sad_4"][72000:84000]
-    check_sound(recording.audio, heard)
+    acted = np.zeros(72000, np.float32)
+    acted[24000:36000] = sounds["005_Sad_4"][72000:84000]
+    check_sound(recording.audio, acted)
 
 
 def test_clean_is_taken_where_both_are(tmp_path):
@@ -144,7 +144,7 @@ def test_timecodes():
         (",FALSE", "", r"info\.csv, line 2: expected 16 cells, as the header has; got 15"),
         ("005_Sad_4.bvh", "009_Sad_4.bvh", r"005_Sad_4\.(bvh|wav): has no row|line 4: there is no file 009_Sad_4\.bvh"),
         ("005_Sad_4.wav", "009_Sad_4.wav", r"there is no file 009_Sad_4\.wav; add it or remove the row"),
-        ("005_Sad_4.bvh", "001_Neutral_0.bvh", "line 4: 001_Neutral_0 stands in .*line 2 already"),
+        ("005_Sad_4.bvh", "001_Neutral_0.bvh", "line 4: 001_Neutral_0 is in .*line 2 already"),
     ],
 )
 def test_damaged_tables(tmp_path, old, new, message):
@@ -186,7 +186,7 @@ def test_wrong_folders(tmp_path, files):
 def test_acting_after_the_end(tmp_path):
     write_original(tmp_path, seconds=0.25)
     with pytest.raises(
-        InputError, match=r"001_Neutral_0\.bvh: lasts 0\.25 s, and by info\.csv the acting starts at 0\.50"
+        InputError, match=r"001_Neutral_0\.bvh: lasts 0\.25 s, and the acting starts at 0\.50 s; correct info\.csv"
     ):
         zeroeggs.read(zeroeggs.find(tmp_path)[0], 16000)
 
@@ -203,6 +203,6 @@ def test_real_take(shared, tmp_path):
     recording = zeroeggs.read(take, 16000)
     assert recording.annotations == {"style": "Speech", "mirrored": False, "session": "2"}
     assert recording.motion.skeleton.names == tree(TREES["zeroeggs"])[0]
-    # The cut that info.csv tells is as long as the clean take: 68 s and 50 sixtieths.
+    # The cut by info.csv is as long as the clean take: 68 s and 50 sixtieths.
     assert recording.motion.seconds == pytest.approx(68 + 50 / 60, abs=0.04)
     assert len(recording.audio) / 16000 == pytest.approx(68 + 50 / 60, abs=0.04)
