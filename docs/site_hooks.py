@@ -1,7 +1,7 @@
 """Hooks of MkDocs: pages outside ``docs/``, links between them, and the page of public names.
 
-A page lies on the site at its path in the repository, pages of ``docs/`` without that prefix. Links in Markdown are those
-of the repository, so that they also work where the files are read unrendered; here they are turned into links of the site,
+A page lies on the site at its path in the repository, pages of ``docs/`` without that prefix. Links in Markdown are
+those of the repository, so that they also work in the unrendered files; here they are turned into links of the site,
 and every file that a page links to is copied there.
 """
 
@@ -35,7 +35,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages outside ``docs/``, all that they link to, and the page of public names."""
     files.append(File.generated(config, "api.md", content=public_names()))
     waiting = [*PAGES, *(f"docs/{file.src_uri}" for file in files.documentation_pages() if file.abs_src_path)]
-    seen = set(waiting)
+    added = set(waiting)
     while waiting:
         path = waiting.pop()
         if not path.startswith("docs/"):
@@ -45,13 +45,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         text = _CODE.sub("", (ROOT / path).read_text(encoding="utf-8"))
         for _, target, _, _ in _LINK.findall(text):
             linked = _repository_path(path, target)
-            if linked and linked not in seen and not linked.startswith("docs/") and (ROOT / linked).is_file():
-                seen.add(linked)
+            if linked and linked not in added and not linked.startswith("docs/") and (ROOT / linked).is_file():
+                added.add(linked)
                 waiting.append(linked)
     return files
 
 
-def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Turn links of the repository into links of the site."""
     here = page.file.src_uri
     source = here if (ROOT / here).is_file() else f"docs/{here}"
@@ -68,7 +68,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return _LINK.sub(link, markdown)
 
 
-def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+def on_page_content(html: str, **_: object) -> str:
     """Show cross-references of docstrings, which are Sphinx roles, as code."""
 
     def name(match: re.Match[str]) -> str:
