@@ -1,11 +1,11 @@
-"""Does a trained model do what it should? Figures on the generated corpus and, where given, on real speech.
+"""Figures of a trained model on the generated corpus and, where given, on real speech.
 
     python -m experiments.first_light RUN [--corpus CORPUS] [--speech a.wav b.wav ...] [--samples 20] [--out FILE.json]
 
-On the generated corpus (its test split, never trained on): reconstruction beside the mean pose; the distance between
-samples for one audio beside that of the true other motions; agreement of wrist-speed peaks with the audio's energy
-peaks beside that with other recordings' audio. On real speech: the same agreement beside the motion shifted by 1 to
-5 s, and the speed of the wrists in pauses beside that in speech. RUN may be 'demo' for the shipped weights.
+On the generated corpus (its test split, never trained on): reconstruction, compared with the mean pose; the distance
+between samples for one audio, compared with other right motions; agreement of wrist-speed peaks with the audio's energy
+peaks, compared with other recordings' audio. On real speech: the same agreement, compared with the motion shifted by 1
+to 5 s, and the speed of the wrists in pauses and in speech. RUN may be 'demo' for the shipped weights.
 """
 
 import argparse
@@ -32,7 +32,7 @@ from a2g_jax.talker.recordings import resample_motion, talk
 from a2g_jax.training.run import Run, demo_run, load_run
 from a2g_jax.training.validation import validate
 
-#: Seconds from a stroke's fastest moment to its syllable's energy peak, as the generated corpus has it.
+#: Seconds from a stroke's fastest moment to its syllable's energy peak in the generated corpus.
 LEAD = 0.15
 SIGMA = 0.1
 
@@ -57,11 +57,11 @@ def jerk(motion: Motion) -> float:
 
 
 def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, object]:
-    """Figures on the held-out splits of a corpus; on a generated one also beside the truth."""
+    """Figures on the held-out splits of a corpus; on a generated one the truth's as well."""
     generator = Generator(run)
     losses = held_out(run, corpus)
     if corpus.recipe.get("reader") != "talker":
-        return losses  # of real recordings there is one take, and no truth to draw from
+        return losses  # a real recording has one take, and no truth to draw from
     roles = [corpus.recipe["roles"][segment.recording] for segment in corpus.splits["test"]][:takes]
     recordings = [talk(**role, fps=run.config.fps) for role in roles]
     speech = []
@@ -98,7 +98,7 @@ def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, o
 
 
 def held_out(run: Run, corpus: Corpus) -> dict[str, object]:
-    """Reconstruction error on everything that was not trained on, beside that of the training data's mean pose."""
+    """Reconstruction error on all held-out data, and that of the training data's mean pose."""
     model = run.config.build()
     parts = {split: validate(model, run.params, corpus, run.config, split) for split in ("validation", "test")}
     return {
@@ -142,7 +142,7 @@ def on_speech(run: Run, path: Path, samples: int) -> dict[str, object]:
 
 
 def main() -> None:
-    """Print the figures as JSON, and write them if asked to."""
+    """Print the figures as JSON, and write them with ``--out``."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run")
     parser.add_argument("--corpus", type=Path)

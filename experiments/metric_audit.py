@@ -1,11 +1,11 @@
-"""Which metric sees what: every metric on the truth spoilt in known ways, by more and more.
+"""Sensitivity of every metric: the truth with controlled corruptions of growing dose.
 
     python -m experiments.metric_audit [--features RUN] [--clips 12] [--seconds 30] [--seed 0]
                                        [--out experiments/results/metric_audit]
 
 Generated recordings; the target is the recording's own motion. A dose of 0 is the truth itself. With a feature network
-(a run of motion_autoencoder on a 22-joint corpus at 30 fps) FGD and LPIPS are there too. Writes
-metric_audit.json and .png.
+(a run of motion_autoencoder on a 22-joint corpus at 30 fps) FGD and LPIPS are included. Writes metric_audit.json and
+.png.
 """
 
 import argparse
@@ -48,7 +48,7 @@ def noise(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
 
 
 def wobble(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
-    """Slow noise on every joint, of about a second: another pose, as smooth as the truth."""
+    """Slow noise on every joint, with a time scale of about a second: another pose, as smooth as the truth."""
     if not degrees:
         return pose
     rotations = np.asarray(matrix_from_6d(pose))
@@ -59,7 +59,7 @@ def wobble(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
 
 
 def late(pose: Pose, seconds: float, _rng: np.random.Generator) -> Pose:
-    """Moved in time, in a circle."""
+    """Circular shift in time."""
     return np.roll(pose, round(seconds * FPS), axis=0)
 
 
@@ -75,7 +75,7 @@ def smoother(pose: Pose, seconds: float, _rng: np.random.Generator) -> Pose:
 
 
 def frozen(pose: Pose, share: float, _rng: np.random.Generator) -> Pose:
-    """Still for that share of every four seconds."""
+    """Frozen for that share of every four seconds."""
     rows = np.arange(len(pose))
     period = round(4.0 * FPS)
     start = rows - rows % period
@@ -84,7 +84,7 @@ def frozen(pose: Pose, share: float, _rng: np.random.Generator) -> Pose:
 
 
 def shuffled(pose: Pose, share: float, rng: np.random.Generator) -> Pose:
-    """That share of its seconds in another order."""
+    """That share of the seconds permuted."""
     blocks = np.arange(len(pose) // round(FPS))
     chosen = rng.permutation(len(blocks))[: round(share * len(blocks))]
     order = blocks.copy()
@@ -164,12 +164,12 @@ def picture(result: dict[str, Any], path: Path) -> None:
         for column, (corruption, curves) in enumerate(corruptions.items()):
             panel = axes[line, column]
             heights = [row[name] for row in curves["scores"]]
-            # Blind: moved by less than a tenth of what the corruptions move it by in the middle.
-            seen = moves[corruption] > 0.1 * np.median(list(moves.values()))
+            # Blind: changed by less than a tenth of the median change over the corruptions.
+            sensitive = moves[corruption] > 0.1 * np.median(list(moves.values()))
             places = range(len(heights))
             panel.axhline(heights[0], color="#b7c0cc", linewidth=1, linestyle="--")
-            panel.plot(places, heights, color="#2f6fde" if seen else "#c2554d", marker="o", markersize=3)
-            panel.set_facecolor("white" if seen else "#fbeeec")
+            panel.plot(places, heights, color="#2f6fde" if sensitive else "#c2554d", marker="o", markersize=3)
+            panel.set_facecolor("white" if sensitive else "#fbeeec")
             panel.tick_params(labelsize=6)
             panel.spines[["top", "right"]].set_visible(False)
             if max(values) > 20 * max(np.nanmedian(values), 1e-9):

@@ -25,7 +25,7 @@ from a2g_jax.viz.player import screenshot_page
 WIDTH = 1600
 #: Heights of a row of figures, and of the timeline under the last one, pixels.
 ROW, TIMELINE = 470, 380
-#: Seconds of the sentence: what the closer look of the timeline shows at once.
+#: Seconds of the sentence: the range of the zoomed timeline.
 SENTENCE = 10.0
 
 _STYLE = """
@@ -102,7 +102,7 @@ def demo_picture(path: Path, folder: Path, time: float) -> None:
 
 
 def _save(image: Image.Image, path: Path) -> None:
-    """As 256 colours, a third of the bytes; most go to the figures, of which the eye sees every step of shading."""
+    """Save with 256 colours, a third of the bytes; most colours go to the shaded figures."""
     pixels = np.asarray(image).reshape(-1, 3)
     vivid = np.ptp(pixels.astype(int), axis=1) > 40
     chosen = np.concatenate([pixels[vivid][::2], pixels[~vivid][::12]])

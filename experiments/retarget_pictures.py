@@ -2,8 +2,8 @@
 
     python -m experiments.retarget_pictures [--out docs/pictures] [--seed 7]
 
-A generated talker (T-pose, y up, metres, 22 joints) moves a rig that shares nothing with it (A-pose, z up, centimetres,
-other names and proportions, five spine joints, twist bones), which moves the talker again. All go through BVH files.
+A generated talker (T-pose, y up, metres, 22 joints) drives a rig that differs in everything (A-pose, z up, centimetres,
+other names and proportions, five spine joints, twist bones), which drives the talker again. All go through BVH files.
 Needs matplotlib. Writes ``retarget.png``.
 """
 
@@ -32,9 +32,9 @@ from matplotlib.patches import Ellipse
 INK, SOFT, LEFT, RIGHT, MIDDLE, TWIST = "#1d2733", "#6b7785", "#2f7fd1", "#e0762f", "#4a5563", "#b03a8c"
 #: Turn and tilt of the camera, radians.
 YAW, PITCH = -0.6, 0.12
-#: Seconds of talk that moments are chosen from.
+#: Seconds of talk from which moments are chosen.
 SECONDS = 30.0
-#: How high above the hips a wrist is then at least, metres.
+#: Minimum height of a wrist above the hips at a chosen moment, metres.
 RAISED = 0.34
 
 
@@ -84,8 +84,8 @@ def through_files(motion: Motion, target: Skeleton, folder: Path) -> tuple[Motio
     write_bvh(folder / "talker.bvh", motion, scale=1.0)
     write_bvh(folder / "other.bvh", still, order="YZX", scale=100.0)
     source, layout = read_with_layout(folder / "talker.bvh")
-    seen, other = read_with_layout(folder / "other.bvh")
-    first, second = find_rig(source), find_rig(seen)
+    read, other = read_with_layout(folder / "other.bvh")
+    first, second = find_rig(source), find_rig(read)
     write_like(folder / "there.bvh", retarget(source, match_rigs(first, second)), other)
     there = read_bvh(folder / "there.bvh")
     write_like(folder / "back.bvh", retarget(there, match_rigs(second, first)), layout)
@@ -111,7 +111,7 @@ def project(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
 
 
 def draw(axes, rig: Rig, rotations: Float[np.ndarray, "J 3 3"], size: float, faint: bool = False) -> None:
-    """One figure: left blue, right orange; the farther a bone, the paler."""
+    """Draw one figure: left blue, right orange; farther bones are paler."""
     skeleton = rig.skeleton
     places, tips = drawn(rig, rotations)
     low = float(min(places[:, 1].min(), tips[:, 1].min()))
@@ -123,12 +123,12 @@ def draw(axes, rig: Rig, rotations: Float[np.ndarray, "J 3 3"], size: float, fai
         return {"L": LEFT, "R": RIGHT}.get(side.get(joint, ""), MIDDLE)
 
     for joint, parent in enumerate(skeleton.parents):
-        # What lies above the pelvis stands for the world.
+        # Nodes above the pelvis represent the world.
         if parent < 0 or "twist" in skeleton.names[joint] or joint == rig.roles["Pelvis"]:
             continue
         bones.append((joints[[joint, parent], 2].mean(), joints[[parent, joint], :2], colour(joint), 5.0))
     for (owner, _), end in zip(skeleton.ends, ends, strict=True):
-        # Ends of twist bones are the writer's; the head is drawn as one.
+        # End sites of twist bones come from the writer; the head is drawn as one bone.
         if "twist" in skeleton.names[owner] or owner == rig.roles["Head"]:
             continue
         bones.append(((joints[owner, 2] + end[2]) / 2, np.stack([joints[owner, :2], end[:2]]), colour(owner), 5.0))
@@ -172,13 +172,13 @@ def draw_axes(axes, rig: Rig) -> None:
         axes.annotate(
             "", tip, corner, arrowprops={"arrowstyle": "-|>", "color": SOFT, "lw": 1.3, "shrinkA": 0, "shrinkB": 0}
         )
-        # An arrow that points away is short: its letter goes above it.
+        # A foreshortened arrow has its letter above it.
         x, y = corner + 1.3 * (tip - corner) + (0.0, 0.035 * (near < -0.5))
         axes.text(x, y, name, color=SOFT, fontsize=10, ha="center", va="center")
 
 
 def moments(motion: Motion, rig: Rig, count: int) -> list[int]:
-    """Frames with a hand raised whose wrists are as unlike as can be, in the order of time."""
+    """Frames with a hand raised and wrists as different as possible, in temporal order."""
     wrists = np.stack([drawn(rig, np.asarray(frame))[0][[rig.roles["L_Wrist"], rig.roles["R_Wrist"]]]
                        for frame in np.asarray(motion.rotations)[::3]])  # fmt: skip
     raised = wrists[:, :, 1].max(axis=1) > RAISED

@@ -1,1 +1,1 @@
-"""Tables 1 to 6 of the extended Audio2Gestures paper, on corpora of our own, beside the paper's figures."""
+"""Tables 1 to 6 of the extended Audio2Gestures paper, on corpora of our own, with the paper's figures."""

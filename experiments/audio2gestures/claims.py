@@ -1,12 +1,12 @@
-"""What the method is said to do, checked on runs of Table 2 with several seeds and put on one page.
+"""Claims about the method, checked on runs of Table 2 with several seeds; writes one page.
 
     python -m experiments.audio2gestures.table2 --corpus CORPUS --features RUN
     python -m experiments.audio2gestures.long --corpus CORPUS --features RUN --steps 3000
     python -m experiments.audio2gestures.codes --corpus CORPUS RUN [RUN ...]
     python -m experiments.audio2gestures.claims
 
-Multimodality beside the generator's own, agreement of the wrists' speed with the speech beside audio that comes late,
-and what the two codes carry when they are exchanged between motions.
+Multimodality compared with the truth's, agreement of the wrists' speed with the speech compared with delayed audio, and
+the content of the two codes when they are exchanged between motions.
 """
 
 import json
@@ -15,8 +15,8 @@ from typing import Any
 from experiments.tables.records import records, results
 
 BASELINE, FULL = "baseline", "+ diversity loss"
-#: Rows that show what keeps the shared code alive.
-LISTENING = (
+#: Rows that show which losses keep the shared code informative.
+RHYTHM_ROWS = (
     "baseline",
     "+ diversity loss",
     "full, paper's losses on samples",
@@ -33,8 +33,8 @@ def of(variant: str, steps: int) -> list[dict[str, Any]]:
     ]
 
 
-def listening(record: dict[str, Any]) -> str:
-    """Agreement with its own audio and with audio that comes late, with intervals over clips."""
+def rhythm_cells(record: dict[str, Any]) -> str:
+    """Agreement with its own audio and with delayed audio, with intervals over clips."""
     found = record["audit"]["conditions"]
     own, late = found["true audio"], [value for name, value in found.items() if name.endswith("late")]
     highest = max(late, key=lambda value: value["agreement"])
@@ -51,7 +51,7 @@ def _interval(value: dict[str, Any]) -> str:
 
 
 def page() -> str:
-    """Markdown."""
+    """Return the page as Markdown."""
     steps = max(
         (record["steps"] for record in records("audio2gestures/table2") if record["variant"] == FULL), default=0
     )
@@ -63,7 +63,7 @@ def page() -> str:
         ),
         None,
     )
-    lines = [f"# What the method does on the generated corpus ({steps} steps a run)", "", "## Multimodality, cm", ""]
+    lines = [f"# Claims on the generated corpus ({steps} steps a run)", "", "## Multimodality, cm", ""]
     lines += ["| row | seed | multimodality | share of the truth's |", "| --- | --- | --- | --- |"]
     for name in (BASELINE, FULL):
         for record in of(name, steps):
@@ -71,17 +71,17 @@ def page() -> str:
             share = "-" if truth is None else f"{value / truth:.2f}"
             lines.append(f"| {name} | {record['seed']} | {value:.2f} | {share} |")
     if truth is not None:
-        lines += ["", f"True motions drawn again for the same speech: {truth:.2f} cm."]
+        lines += ["", f"Other true motions for the same speech: {truth:.2f} cm."]
     lines += ["", "## Rhythm: agreement of the wrists' speed peaks with the speech's energy peaks", ""]
-    lines += ["| row | seed | its own audio | the best of audio 1, 2, 5 s late | intervals |", "|" + " --- |" * 5]
-    for name in LISTENING:
+    lines += ["| row | seed | its own audio | the best of audio delayed by 1, 2, 5 s | intervals |", "|" + " --- |" * 5]
+    for name in RHYTHM_ROWS:
         for record in of(name, steps):
             if record.get("audit"):
-                lines.append(f"| {name} | {record['seed']} | {listening(record)} |")
+                lines.append(f"| {name} | {record['seed']} | {rhythm_cells(record)} |")
     for record in records("audio2gestures/long"):
         if record.get("audit"):
             title = f"{record['variant']}, {record['steps']} steps"
-            lines.append(f"| {title} | {record['seed']} | {listening(record)} |")
+            lines.append(f"| {title} | {record['seed']} | {rhythm_cells(record)} |")
     path = results("audio2gestures") / "codes.json"
     if path.exists():
         lines += ["", "## Codes exchanged between two motions", ""]
@@ -96,10 +96,10 @@ def page() -> str:
 
 
 def _exchanged(runs: dict[str, Any], kind: str, first: str, second: str) -> list[str]:
-    """What became of the hand and of the strokes, as rows."""
+    """Rows with the origin of the hand and of the strokes."""
     shared = "shared" if not kind else "audio"
     keys = ("hand_follows_specific", f"strokes_follow_{shared}", "strokes_follow_specific", "strokes_of_a_stranger")
-    head = f"| run | pairs | the hand is {second} | strokes are {first} | strokes are {second} | a stranger's |"
+    head = f"| run | pairs | the hand is {second} | strokes are {first} | strokes are {second} | an unrelated clip's |"
     lines = [head, "|" + " --- |" * 6]
     for name, found in runs.items():
         values = [found[kind + key] for key in keys]

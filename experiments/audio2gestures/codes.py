@@ -1,14 +1,14 @@
-"""What the two codes of a trained Audio2Gestures carry: swapped between motions of the generated corpus.
+"""Content of the two codes of a trained Audio2Gestures, measured by exchanging them between motions.
 
     python -m experiments.audio2gestures.codes --corpus CORPUS RUN [RUN ...]
 
-Clips of the test split in which one wrist clearly moves more are paired so that the two wrists differ. Of two clips A
-and B, ``g(S_A, I_B)`` is decoded: the wrist that moves more should be B's (the hidden choice is in I), and the moments
-at which a wrist is fast should be A's (the rhythm is in S). Chance is one half for the hand; for the times the same is
-measured against the strokes of a third clip.
+Clips of the generated corpus's test split in which one wrist clearly moves more are paired so that the wrists differ.
+Of two clips A and B, ``g(S_A, I_B)`` is decoded: the wrist that moves more should be B's (the hidden choice is in I),
+and the moments at which a wrist is fast should be A's (the rhythm is in S). Chance is one half for the hand; for the
+times the same is measured against the strokes of a third clip.
 
-An I_M tells nearly everything (the paper's Sec. 6.4), times included, so the same is measured as generation has it: S_A
-of A's speech with an I_R that the mapping net makes of noise with the mean and deviation of I_B. Writes
+An I_M determines nearly everything (the paper's Sec. 6.4), times included, so the same is measured as in generation:
+S_A of A's speech with an I_R that the mapping net makes of noise with the mean and standard deviation of I_B. Writes
 ``results/codes.json``.
 """
 
@@ -30,9 +30,9 @@ from a2g_jax.training.run import Run, demo_run, load_run
 from experiments.tables.records import results
 
 FRAMES = 128
-#: Share by which one wrist must move more than the other.
+#: Minimum dominance of one wrist over the other.
 CLEAR = 0.25
-#: Of the agreement of peaks, seconds.
+#: Width of the agreement of peaks, seconds.
 SIGMA = 0.1
 
 
@@ -48,13 +48,13 @@ def clips_of(corpus: Corpus) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dominance(speeds: np.ndarray) -> float:
-    """From -1 (right wrist alone moves) to 1 (left); speeds are (T, 2), left first."""
+    """Dominance from -1 (only the right wrist moves) to 1 (left); speeds are (T, 2), left first."""
     left, right = speeds.mean(axis=0)
     return float((left - right) / (left + right + 1e-9))
 
 
 def wrist_speeds(body: Body, pose: np.ndarray, fps: float) -> np.ndarray:
-    """Of both wrists, m/s, (T, 2), smoothed over 0.05 s."""
+    """Speeds of both wrists, m/s, (T, 2), smoothed over 0.05 s."""
     from scipy.ndimage import gaussian_filter1d
 
     places = gaussian_filter1d(body.wrists(body.places(pose)), 0.05 * fps, axis=0)
@@ -62,10 +62,10 @@ def wrist_speeds(body: Body, pose: np.ndarray, fps: float) -> np.ndarray:
 
 
 def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
-    """Shares and agreements with their 95 % intervals over pairs."""
+    """Shares and agreements of exchanged codes with 95 % intervals over pairs."""
     body, fps = Body(corpus.body, corpus.representation), corpus.fps
     networks = Codec(run.config.model_config, run.config.data())
-    clips, heard = clips_of(corpus)
+    clips, features = clips_of(corpus)
     speeds = [wrist_speeds(body, clip, fps) for clip in clips]
     sides = np.array([dominance(one) for one in speeds])
     clear = np.nonzero(np.abs(sides) > CLEAR)[0]
@@ -90,18 +90,18 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
 
     firsts, seconds = [a for a, _ in pairs], [b for _, b in pairs]
     made = np.asarray(decode(clips[firsts], clips[seconds]))
-    drawn = np.asarray(generate(heard[firsts], clips[seconds]))
+    drawn = np.asarray(generate(features[firsts], clips[seconds]))
     peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
     hand: list[float] = []
     own: list[float] = []
     donor: list[float] = []
-    stranger: list[float] = []
+    unrelated: list[float] = []
     drawn_hand: list[float] = []
     drawn_own: list[float] = []
     drawn_donor: list[float] = []
-    drawn_stranger: list[float] = []
-    swapped = (made, hand, own, donor, stranger)
-    generated = (drawn, drawn_hand, drawn_own, drawn_donor, drawn_stranger)
+    drawn_unrelated: list[float] = []
+    swapped = (made, hand, own, donor, unrelated)
+    generated = (drawn, drawn_hand, drawn_own, drawn_donor, drawn_unrelated)
     for poses, hands, *agreements in (swapped, generated):
         for (a, b), pose in zip(pairs, poses, strict=True):
             ours = wrist_speeds(body, pose, fps)
@@ -114,11 +114,11 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
         "hand_follows_specific": hand,
         "strokes_follow_shared": own,
         "strokes_follow_specific": donor,
-        "strokes_of_a_stranger": stranger,
+        "strokes_of_a_stranger": unrelated,
         "drawn_hand_follows_specific": drawn_hand,
         "drawn_strokes_follow_audio": drawn_own,
         "drawn_strokes_follow_specific": drawn_donor,
-        "drawn_strokes_of_a_stranger": drawn_stranger,
+        "drawn_strokes_of_a_stranger": drawn_unrelated,
     }
     return {"pairs": len(pairs), **{name: bootstrap_mean(np.array(v), rng)._asdict() for name, v in figures.items()}}
 

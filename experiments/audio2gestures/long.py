@@ -1,8 +1,8 @@
-"""The full model of Table 2, trained three times as long: what its rhythm comes to.
+"""The full model of Table 2, trained three times as long.
 
     python -m experiments.audio2gestures.long --corpus CORPUS --features RUN
 
-Table 2 stops where the shared code has just begun to be heard.
+Table 2 stops where the shared code just begins to affect the motion.
 """
 
 from experiments.audio2gestures.table2 import VARIANTS

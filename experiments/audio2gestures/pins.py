@@ -2,8 +2,8 @@
 
     python -m experiments.audio2gestures.pins RUN --corpus CORPUS [--pins 40] [--seed 0]
 
-Clips of one to three seconds of newly generated recordings are pinned at random moments of the speech of others by the
-same speaker, each with a sample of its own; speakers take turns. Writes ``results/pins.json``.
+Clips of one to three seconds of newly generated recordings are pinned at random moments of another speech by the same
+speaker, each with a sample of its own; speakers take turns. Writes ``results/pins.json``.
 """
 
 import argparse
@@ -27,13 +27,13 @@ from a2g_jax.training.run import Run, demo_run, load_run
 from experiments.tables.records import results
 
 SECONDS = 12.0
-#: Seconds of blending, and share of the clip's own shared code.
+#: Seconds of blending, and weight of the clip's own shared code.
 SETTINGS = ((0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (0.5, 1.0))
 ERRORS = ("error_cm", "unpinned_error_cm", "wrist_error_cm", "unpinned_wrist_error_cm")
 
 
 def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, shared: float) -> dict[str, Any]:
-    """Errors of pinned and unpinned samples, and jerk at the seams against the corpus's 99th percentile."""
+    """Errors of pinned and unpinned samples, and jerk at the seams compared with the corpus's 99th percentile."""
     space, limit = LatentSpace(run), corpus_jerk(corpus)
     facing = np.asarray(matrix_from_6d(np.asarray(run.config.statistics["pose"].mean[0])), np.float64)
     rng = np.random.default_rng(seed)
@@ -51,7 +51,7 @@ def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, share
         plain = space.to_motion(codes)
         rows += report_pins([pin], pinned, plain, limit, "99th percentile of the corpus", blend)
         unpinned += report_pins([pin], plain, plain, limit, "", blend)
-        # What a recorded motion itself has in as long a stretch.
+        # The same measure of recorded motion over an equally long stretch.
         recorded += report_pins([Pin("", start, clip)], own.motion, own.motion, limit, "", blend)
     means = {name: bootstrap_mean(np.array([row[name] for row in rows]), rng)._asdict() for name in ERRORS}
     share = {

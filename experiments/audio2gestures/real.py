@@ -4,9 +4,9 @@
     a2g prepare zeroeggs DIR --out ZEGGS --fps 30 --random-split
     python -m experiments.audio2gestures.real --beat BEAT --zeroeggs ZEGGS [--steps 200]
 
-A take of a minute says little of a method: the intervals are over clips of one recording and over seeds. There is no
-feature network, because a network trained on a minute of motion measures nothing. Weights trained on research-only
-recordings stay where ``--runs`` puts them.
+A take of a minute says little about a method: the intervals are over clips of one recording and over seeds. There is no
+feature network, because one trained on a minute of motion would not be informative. Weights trained on research-only
+recordings stay in the folder of ``--runs``.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ CLAIMS = (
         1,
     ),
     Claim(
-        "split harms position L1 beside Speech2Gesture",
+        "split harms position L1 compared with Speech2Gesture",
         "Audio2Gestures",
         "Speech2Gesture without GAN",
         "position_l1",
@@ -42,8 +42,8 @@ CLAIMS = (
 
 
 def main() -> None:
-    """Train and score what is missing, and draw a table for each take."""
-    parser = arguments("Real takes: the first part trains, the rest is scored", steps=200)
+    """Train and score what is missing, and render a table for each take."""
+    parser = arguments("Real takes: trained on the first part, scored on the rest", steps=200)
     parser.add_argument("--beat", type=Path, help="a corpus of BEAT, at 30 fps")
     parser.add_argument("--zeroeggs", type=Path, help="a corpus of ZeroEGGS, at 30 fps")
     options = parser.parse_args()

@@ -1,10 +1,10 @@
-"""What the tables of Audio2Gestures have in common."""
+"""Common settings of the tables of Audio2Gestures."""
 
-#: What the tables change in the tiny preset, for every row of Audio2Gestures. It was found by trying on seed 0: clips
-#: of 64 frames, as in the authors' published command; a wider specific code, a larger diversity loss, and in
-#: generation one draw of the statistics for the whole speech, as in the paper, with noise that changes slowly and is
-#: three times as strong as in training (less leaves samples too much alike, by FGD, diversity and multimodality). The
-#: paper's own weights silence the shared code at this size (Table 2).
+#: Changes of the tiny preset for every row of Audio2Gestures, chosen on seed 0: clips of 64 frames, as in the authors'
+#: published command; a wider specific code, a larger diversity loss, and in generation one draw of the statistics for
+#: the whole speech, as in the paper, with noise that changes slowly and is three times as strong as in training (less
+#: makes samples too similar, by FGD, diversity and multimodality). The paper's own weights silence the shared code at
+#: this size (Table 2).
 BASE = {
     "clip_frames": 64,
     "kl_specific_weight": 5e-5,

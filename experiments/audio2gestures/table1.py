@@ -1,11 +1,11 @@
-"""Table 1: Audio2Gestures beside Speech2Gesture, in 3D and in 2D.
+"""Table 1: Audio2Gestures compared with Speech2Gesture, in 3D and in 2D.
 
     python -m experiments.audio2gestures.table1 --corpus CORPUS --features RUN \\
         --corpus-2d CORPUS --features-2d RUN [--budget MINUTES]
 
 The 2D corpus is one of ``a2g prepare talker --minutes 60 --seed 6 --view s2g --features audio2gestures-2d``: 49
 keypoints at 15 fps, clips of 64 frames; its network is ``experiments/features/talker_2d`` (1000 steps). Without a
-corpus the tables are drawn from the records that there are.
+corpus the tables are rendered from the existing records.
 """
 
 from collections.abc import Mapping
@@ -21,10 +21,9 @@ from experiments.tables.runs import Variant, arguments, setting
 OURS, WITHOUT_GAN, WITH_GAN = "Audio2Gestures", "Speech2Gesture without GAN", "Speech2Gesture"
 
 
-#: Found on seed 0. Errors of keypoints are in z-scores, ten times those of positions in metres: with the weights that
-#: the speeds of joints have it costs least to stand still, and after 500 steps nothing moved. The specific code spreads
-#: wide here, so noise as strong as in training is enough; three times as strong, samples differ by more than true
-#: motions.
+#: Chosen on seed 0. Errors of keypoints are in z-scores, ten times those of positions in metres: with the speed weights
+#: of joints, standing still costs least, and after 500 steps motion was static. The specific code spreads wide here, so
+#: noise as strong as in training is enough; with three times that, samples differ by more than true motions.
 _KEYPOINTS = {"speed_weight": 0.5, "sampled_speed_weight": 0.5, "noise_scale": 1.0}
 
 
@@ -46,7 +45,7 @@ TABLES = {
             Claim("without GAN, position L1 is about ours or lower", WITHOUT_GAN, OURS, "position_l1", -1),
             Claim("the GAN worsens position L1", WITH_GAN, WITHOUT_GAN, "position_l1", 1),
             Claim("the GAN lowers PCK", WITH_GAN, WITHOUT_GAN, "pck", -1),
-            Claim("ours is the more diverse (beside S2G without GAN)", OURS, WITHOUT_GAN, "diversity", 1),
+            Claim("ours is more diverse than S2G without GAN", OURS, WITHOUT_GAN, "diversity", 1),
             Claim("ours is multimodal, Speech2Gesture is not", OURS, WITHOUT_GAN, "multimodality", 1),
         ),
         {
@@ -76,7 +75,7 @@ TABLES = {
 
 
 def main() -> None:
-    """Train and score what is missing, and draw both tables."""
+    """Train and score what is missing, and render both tables."""
     parser = arguments("Table 1: comparison with Speech2Gesture, in 3D and 2D", steps=500)
     parser.add_argument("--corpus-2d", type=Path, help="made by 'a2g prepare talker --view s2g'")
     parser.add_argument("--features-2d", type=Path, help="a run of motion_autoencoder on it")

@@ -2,7 +2,7 @@
 
     python -m experiments.audio2gestures.table2 --corpus CORPUS --features RUN [--budget MINUTES]
 
-Without a corpus the table is drawn from the records that there are.
+Without a corpus the table is rendered from the existing records.
 """
 
 from experiments.audio2gestures.settings import BASE
@@ -10,7 +10,7 @@ from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
 from experiments.tables.runs import Variant
 
-#: Without the weights that the authors' code puts on sampled motions beside the paper's relaxed loss.
+#: Without the losses on sampled motions that the authors' code adds to the paper's relaxed loss.
 PAPER_LOSSES = {"sampled_rotation_weight": 0.0, "sampled_speed_weight": 0.0}
 _OFF = {"bicycle_weight": 0.0, "diversity_weight": 0.0}
 

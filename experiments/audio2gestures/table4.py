@@ -1,8 +1,8 @@
-"""Table 4: structured and perceptual training losses; the rows of noise on the truth are among the baselines.
+"""Table 4: structured and perceptual training losses; rows of the truth with noise are among the baselines.
 
     python -m experiments.audio2gestures.table4 --corpus CORPUS --features RUN [--budget MINUTES]
 
-The paper does not give the losses' weights. Ours make each about as large as the position loss early in training.
+The paper does not give the losses' weights. Ours make each term about as large as the position loss early in training.
 """
 
 from experiments.audio2gestures.settings import BASE

@@ -1,8 +1,8 @@
-"""Table 5: what the encoders are made of; the decoder is a TCN in every row.
+"""Table 5: backbones of the encoders; the decoder is a TCN in every row.
 
     python -m experiments.audio2gestures.table5 --corpus CORPUS --features RUN [--budget MINUTES]
 
-The paper trains the Transformer on sequences of 512 frames; here all rows have the same clips of 64.
+The paper trains the Transformer on sequences of 512 frames; here all rows have clips of 64.
 """
 
 from experiments.audio2gestures.settings import BASE

@@ -2,7 +2,7 @@
 
     python -m experiments.audio2gestures.table6 --corpus CORPUS --features RUN [--budget MINUTES]
 
-One run with a latent space of DCT bands for each seed; every edit is made of it in generation.
+One run with a latent space of DCT bands for each seed; edits act on it in generation.
 """
 
 from experiments.audio2gestures.settings import BASE
@@ -11,7 +11,7 @@ from experiments.tables.markdown import make
 from experiments.tables.runs import Variant
 
 DCT = "A2G with DCT"
-#: Bands have no order in time, so their noise has no memory either; 128 points take clips of 128 frames.
+#: Bands have no temporal order, so their noise is independent as well; 128 points need clips of 128 frames.
 _SETTINGS = {**BASE, "latent": "dct", "noise_frames": 1, "clip_frames": 128}
 
 

@@ -1,9 +1,9 @@
-"""What evaluating costs at the papers' size: 20 samples of 4 test sequences of 5000 frames, all metrics.
+"""Cost of evaluation at the papers' size: 20 samples of 4 test sequences of 5000 frames, all metrics.
 
     python -m experiments.benchmarks.evaluation [--sequences 4] [--frames 5000] [--samples 20] [--seed 0]
 
-Generates the corpus (not timed); then scores the run and the feature network that come with the package with every
-baseline, and once more with the listening audit.
+Generates the corpus (not timed); then scores the included run with the included feature network and every baseline, and
+once more with the listening audit.
 """
 
 import argparse
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def _write_corpus(options: argparse.Namespace) -> None:
-    """As many test recordings as asked for, and as many to look neighbours up in."""
+    """Write the requested number of test recordings, and as many to look up neighbours in."""
     from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
     from a2g_jax.data.settings import Features
     from a2g_jax.talker.recordings import cast, talk

@@ -1,6 +1,6 @@
-"""Speed of sampling from the stylized flow and MoGlow with random weights: ours beside an eager PyTorch twin's.
+"""Speed of sampling from the stylized flow and MoGlow with random weights: ours and an eager PyTorch twin's.
 
-The contenders take turns in one process, so that whatever else the machine does meets them alike. Every turn goes from
+The contenders take turns in one process, so that other load on the machine affects them alike. Every turn goes from
 audio features to z-scores of poses for one audio, frame by frame, with the latents given.
 """
 
@@ -15,11 +15,11 @@ from typing import Any
 
 from experiments.benchmarks import measure
 
-#: Ours; the twin with the whole condition through its recurrent layers; the twin with the audio's share taken before.
+#: Ours; the twin with the whole condition through its recurrent layers; the twin with the audio's share precomputed.
 CONTENDERS = ("a2g_jax", "torch_eager", "torch_precomputed")
-#: Bytes copied to measure the memory's bandwidth; far more than caches hold.
+#: Bytes copied to measure the memory's bandwidth; far more than the caches' size.
 _COPIED = 2**28
-#: Frames; the first 20 of them do not reach its end, however far ahead audio is told.
+#: Frames; the first 20 of them do not reach its end, whatever the lookahead.
 _WARM_UP = 50
 
 
@@ -82,7 +82,7 @@ def bandwidth(threads: int) -> float:
 
 
 def _case(options: argparse.Namespace) -> dict[str, Any]:
-    """Rows of every number of sequences and every contender."""
+    """Rows for every number of sequences and every contender."""
     import jax
     import numpy as np
 
@@ -142,7 +142,7 @@ def _turn(call: Callable[[], Any], frames: int) -> dict[str, Any]:
 
 
 def _bytes_of_a_frame(params: Any) -> int:
-    """Of the weights that every frame needs: all but those that multiply audio."""
+    """Bytes of the weights that every frame needs: all but those that multiply audio."""
     import jax
 
     couplings, encoder = params["glow"]["coupling"], params.get("global_encoder", {})
@@ -152,7 +152,7 @@ def _bytes_of_a_frame(params: Any) -> int:
 
 
 def _contenders(case: Any, networks: Any, params: Any, names: list[str]) -> dict[str, Callable[..., Any]]:
-    """For each, a function from latents (B, T, C) and audio (T, bands) to motions (B, T, C)."""
+    """For each contender a function from latents (B, T, C) and audio (T, bands) to motions (B, T, C)."""
     calls = {name: call for name, call in (("a2g_jax", _ours(networks, params)),) if name in names}
     return calls | (_twins(case, params, names) if any(name.startswith("torch") for name in names) else {})
 
@@ -165,8 +165,8 @@ def _ours(networks: Any, params: Any) -> Callable[..., Any]:
     begin, proceed = jax.jit(networks.start, static_argnums=1), jax.jit(networks.proceed)
 
     def sample(z: Any, audio: Any) -> Any:
-        carried = begin(params, len(z))
-        x, _ = proceed(params, np.ascontiguousarray(z.swapaxes(0, 1)), condition(params, audio), carried)
+        state = begin(params, len(z))
+        x, _ = proceed(params, np.ascontiguousarray(z.swapaxes(0, 1)), condition(params, audio), state)
         return np.asarray(x).swapaxes(0, 1)
 
     return sample

@@ -1,7 +1,7 @@
-"""Time and memory of one training step of the stylized flow and MoGlow: ours beside an eager PyTorch twin's.
+"""Time and memory of one training step of the stylized flow and MoGlow: ours and an eager PyTorch twin's.
 
-A step computes bits per frame and their gradients, clips those and updates by Adam, on a batch that is there already;
-the stylized flow's also with the reverse pass, which one batch in five takes.
+A step computes bits per frame and their gradients, clips those and updates by Adam, on a fixed batch; the stylized
+flow's also with the reverse pass, which one batch in five takes.
 """
 
 import argparse
@@ -78,7 +78,7 @@ def _one(options: argparse.Namespace) -> dict[str, Any]:
     config = replace(case.config, reverse_share=1.0 if reverse else 0.0)
     settings = training_preset("stylized_flow", case.preset)
     clips, rng = options.batch or case.batch, np.random.default_rng(options.seed)
-    # Walks, so that neighbouring frames are alike.
+    # Random walks, so that neighbouring frames are similar.
     steps = rng.normal(0, 0.1, (clips, config.clip_frames, case.rows, 3))
     pose = np.sin(np.cumsum(steps, axis=1)).astype(np.float32)
     audio = rng.normal(size=(clips, config.clip_frames, case.bands)).astype(np.float32)
@@ -91,7 +91,7 @@ def _one(options: argparse.Namespace) -> dict[str, Any]:
         used.append(time.process_time() - before)
 
     figures = measure.measure(call, options.repeats, 1)
-    # CPU time of all threads tells something on a busy machine too.
+    # CPU time of all threads is informative on a busy machine too.
     figures["cpu_s"] = statistics.median(used[-options.repeats :])
     return {**figures, **last, "title": case.title, "clips": clips}
 
@@ -134,17 +134,17 @@ def _twin(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: in
     load_params(twin, params)
     del params
     adam = torch.optim.Adam(twin.parameters(), lr=settings.learning_rate / settings.warmup_steps, fused=True)
-    flat, heard = torch.from_numpy(pose).flatten(2), torch.from_numpy(audio)
+    flat, audio_features = torch.from_numpy(pose).flatten(2), torch.from_numpy(audio)
     inner = config.clip_frames - config.history_frames - config.lookahead_frames
 
     def call() -> dict[str, float]:
-        seen = torch.rand(len(flat), inner, config.history_frames) >= config.frame_dropout
+        visible = torch.rand(len(flat), inner, config.history_frames) >= config.frame_dropout
         z = None
         if config.reverses:
             z = torch.randn(len(flat), inner, case.channels)
             z = z / (torch.distributions.Chi2(config.freedom).sample((len(flat), inner, 1)) / config.freedom).sqrt()
         adam.zero_grad(set_to_none=True)
-        terms = twin.terms(flat + config.input_noise * torch.randn_like(flat), heard, seen, z)
+        terms = twin.terms(flat + config.input_noise * torch.randn_like(flat), audio_features, visible, z)
         loss = sum(terms.values())
         loss.backward()
         utils.clip_grad_value_(twin.parameters(), settings.clip_value)

@@ -1,4 +1,4 @@
-"""What the flow's benchmarks work on: the papers' sizes, random weights, random audio; nothing is downloaded."""
+"""Workload of the flow's benchmarks: the papers' sizes, random weights, random audio; nothing is downloaded."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,12 +33,12 @@ class Case:
 
     @property
     def config(self) -> StylizedFlowConfig:
-        """The preset, without the loss that needs another network."""
+        """The preset without the loss that needs another network."""
         return replace(PRESETS[self.preset], perceptual_weight=0.0)
 
     @property
     def data(self) -> Data:
-        """Poses that are z-scores already."""
+        """Data of poses that are z-scores already."""
         zeros = np.zeros((self.rows, 3), np.float32)
         layout = PoseLayout(tuple(f"row {row}" for row in range(self.rows)), ())
         return Data(layout, self.fps, self.bands, Statistics(zeros, zeros + 1.0), "directions")
@@ -52,7 +52,7 @@ CASES = {
 
 
 def moved(params: Any, seed: int) -> Any:
-    """Weights whose last layers are no longer zero, so that every layer counts in the motion."""
+    """Weights with nonzero last layers, so that every layer affects the motion."""
     coupling = params["glow"]["coupling"]
     noise = 0.01 * jax.random.normal(jax.random.key(seed), coupling["out_kernel"].shape)
     return {**params, "glow": {**params["glow"], "coupling": {**coupling, "out_kernel": jnp.asarray(noise)}}}

@@ -21,12 +21,12 @@ _MARK = "FIGURES "
 
 
 def limit_threads() -> None:
-    """Two threads for whichever library is imported next; call it before JAX, NumPy or PyTorch are."""
+    """Two threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ[name] = str(THREADS)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if hasattr(os, "sched_setaffinity"):
-        # XLA has as many threads as the process has cores.
+        # XLA uses as many threads as the process has cores.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
 
 
@@ -92,7 +92,7 @@ def peak_megabytes() -> float:
 
 
 def report(figures: dict[str, Any]) -> None:
-    """Hand figures to the process that started this one."""
+    """Report figures to the process that started this one."""
     print(_MARK + json.dumps({**figures, "peak_mb": peak_megabytes()}), flush=True)
 
 

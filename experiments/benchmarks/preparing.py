@@ -1,9 +1,9 @@
-"""How fast recordings become a corpus, and how much memory it takes.
+"""Speed and memory of preparing recordings.
 
     python -m experiments.benchmarks.preparing [--minutes 60] [--takes 12] [--seed 0]
 
-Generates BVH and WAV files (not timed), then prepares them as a user does, from nothing, with one process and with one
-a core: rigs as they are, retargeted to the 22 body joints, and 2D keypoints in Speech2Gesture's windows.
+Generates BVH and WAV files (not timed), then prepares them with the command, from nothing, with one process and with
+one a core: rigs as they are, retargeted to the 22 body joints, and 2D keypoints in Speech2Gesture's windows.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from typing import Any
 
 from experiments.benchmarks import measure
 
-#: What is prepared: layout, joints, and how many processes (None: one a core).
+#: Layout, joints, and number of processes (None: one a core).
 CONTENDERS: dict[str, tuple[str, str, int | None]] = {
     "BVH of 52 joints at 60 fps, as it is, one process": ("folder", "all", 1),
     "BVH of 52 joints at 60 fps, to 22 joints, one process": ("folder", "body", 1),
@@ -72,7 +72,7 @@ def main() -> None:
 
 
 def _write_sources(folder: Path, options: argparse.Namespace) -> None:
-    """The same talk as BVH and WAV pairs, and as Speech2Gesture's windows."""
+    """Write the same talk as BVH and WAV pairs and as Speech2Gesture's windows."""
     from a2g_jax.io.audio import write_audio
     from a2g_jax.io.bvh import write_bvh
     from a2g_jax.talker.recordings import talk

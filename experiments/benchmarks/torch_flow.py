@@ -1,8 +1,8 @@
 """A PyTorch twin of our stylized flow and MoGlow: the same networks and losses, to compare values and speed.
 
-Written from ``a2g_jax.models.stylized_flow`` with PyTorch's own recurrent layers, whose gates are the same. Sampling is
-there twice: plainly, with the whole condition through every recurrent layer at every frame, and with the audio's share
-of the gates and the audio's embedding taken for all frames before. Either way the inverse matrices are taken once.
+Written from ``a2g_jax.models.stylized_flow`` with PyTorch's own recurrent layers, whose gates are the same. Sampling
+has two forms: with the whole condition through every recurrent layer at every frame, and with the audio's share of the
+gates and the audio's embedding precomputed for all frames. Either way matrices are inverted once.
 """
 
 import math
@@ -15,7 +15,7 @@ from torch.nn import functional
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from experiments.benchmarks.torch_layers import Conv, LayerNorm
 
-#: Smallest scale of a coupling, and what is added to a raw scale before the sigmoid.
+#: Smallest scale of a coupling, and the offset of a raw scale before the sigmoid.
 _EPSILON, _OFFSET = 1e-6, 2.0
 
 
@@ -30,7 +30,7 @@ class Actnorm(nn.Module):
         return (x + self.bias) * self.log_scale.exp()
 
     def inverse(self, y: Tensor) -> Tensor:
-        """What :meth:`forward` made ``y`` of."""
+        """Inverse of :meth:`forward`."""
         return y * (-self.log_scale).exp() - self.bias
 
 
@@ -92,14 +92,14 @@ class Step(nn.Module):
         return torch.cat([kept, (changed + shift) * scale], dim=-1), log_det
 
     def inverse(self, y: Tensor, condition: Tensor, matrix: Tensor, state: Any = None) -> tuple[Tensor, Any]:
-        """What :meth:`forward` made ``y`` of, and the state; ``matrix`` is the inverse one."""
+        """Inverse of :meth:`forward`, and the state; ``matrix`` is the inverse one."""
         kept, changed = y[..., : self.coupling.kept], y[..., self.coupling.kept :]
         scale, shift, state = self.coupling(kept, condition, state)
         return self.actnorm.inverse(torch.cat([kept, changed / scale - shift], dim=-1) @ matrix.T), state
 
 
 class WindowEncoder(nn.Module):
-    """Of a stretch (B, C, T), averaged over time; parts are named as Flax names ours."""
+    """Embedding of a stretch (B, C, T), averaged over time; parts have the names of Flax."""
 
     def __init__(self, config: StylizedFlowConfig, inputs: int) -> None:
         super().__init__()
@@ -138,10 +138,10 @@ class Fusion(nn.Module):
 
 
 class Split(NamedTuple):
-    """A coupling's first layer without the audio's columns, and what those add to the gates of every frame."""
+    """A coupling's first layer without the audio's columns, and their contribution to the gates of every frame."""
 
     weight: Tensor
-    known: Tensor
+    audio_gates: Tensor
 
 
 class Twin(nn.Module):
@@ -152,8 +152,8 @@ class Twin(nn.Module):
         if config.style_controls:
             raise ValueError("Expected a configuration without style controls.")
         self.config = config
-        self.told_width = config.history_frames * channels + config.global_channels
-        width = self.told_width + config.audio_frames * bands
+        self.context_width = config.history_frames * channels + config.global_channels
+        width = self.context_width + config.audio_frames * bands
         self.steps = nn.ModuleList(Step(config, channels, width) for _ in range(config.flow_steps))
         self.global_encoder = None
         if config.global_channels:
@@ -176,15 +176,15 @@ class Twin(nn.Module):
         both = torch.cat([pose, audio], dim=-1)
         return self.global_encoder["fusion"](both.flatten(0, 1)).unflatten(0, both.shape[:2])
 
-    def condition(self, flat: Tensor, audio: Tensor, seen: Tensor) -> Tensor:
-        """What the inner frames of clips (B, T, C) and (B, T, bands) are told; ``seen`` is (B, N, history)."""
+    def condition(self, flat: Tensor, audio: Tensor, visible: Tensor) -> Tensor:
+        """Context of the inner frames of clips (B, T, C) and (B, T, bands); ``visible`` is (B, N, history)."""
         config = self.config
         history = _stretches(flat[:, : flat.shape[1] - 1 - config.lookahead_frames], config.history_frames)
-        history, heard = history * seen[..., None], _stretches(audio, config.audio_frames)
-        told = [history.flatten(2)]
+        history, windows = history * visible[..., None], _stretches(audio, config.audio_frames)
+        context = [history.flatten(2)]
         if self.global_encoder is not None:
-            told.append(self.fuse(self.embed("pose", history), self.embed("audio", heard)))
-        return torch.cat([*told, heard.flatten(2)], dim=-1)
+            context.append(self.fuse(self.embed("pose", history), self.embed("audio", windows)))
+        return torch.cat([*context, windows.flatten(2)], dim=-1)
 
     def latents(self, x: Tensor, condition: Tensor) -> tuple[Tensor, Tensor]:
         """Latents (B, N, C) and log-determinants (B, N)."""
@@ -200,10 +200,10 @@ class Twin(nn.Module):
             z, _ = step.inverse(z, condition, torch.linalg.inv(step.invertible.weight()))
         return z
 
-    def terms(self, flat: Tensor, audio: Tensor, seen: Tensor, z: Tensor | None = None) -> dict[str, Tensor]:
-        """Bits per frame, and with latents ``z`` the distance of what they become from the truth."""
+    def terms(self, flat: Tensor, audio: Tensor, visible: Tensor, z: Tensor | None = None) -> dict[str, Tensor]:
+        """Bits per frame, and with latents ``z`` the distance of their motion from the truth."""
         config = self.config
-        condition = self.condition(flat, audio, seen)
+        condition = self.condition(flat, audio, visible)
         inner = flat[:, config.history_frames : flat.shape[1] - config.lookahead_frames]
         latents, log_det = self.latents(inner, condition)
         terms = {"bits": -(log_prob(latents, config.freedom) + log_det).mean() / math.log(2.0)}
@@ -216,42 +216,47 @@ class Twin(nn.Module):
         """Motions (B, T, C) of latents for one audio (T, bands), frame by frame from the mean pose.
 
         Args:
-            precompute: take what only the audio has a part in for all frames before, as ours does.
+            precompute: compute the terms that depend only on the audio for all frames in advance, as ours does.
         """
         config, count = self.config, len(z)
         padded = functional.pad(audio, (0, 0, config.history_frames, config.lookahead_frames))
-        heard = _stretches(padded[None], config.audio_frames)
-        known = heard[0].flatten(1)
-        embedding = self.embed("audio", heard) if self.global_encoder is not None and precompute else None
+        windows = _stretches(padded[None], config.audio_frames)
+        audio_flat = windows[0].flatten(1)
+        embedding = self.embed("audio", windows) if self.global_encoder is not None and precompute else None
         matrices = [torch.linalg.inv(step.invertible.weight()) for step in self.steps]
-        splits = [self._split(step.coupling, known) for step in self.steps] if precompute else []
+        splits = [self._split(step.coupling, audio_flat) for step in self.steps] if precompute else []
         states: list[Any] = [self._rest(count, z) if precompute else None for _ in self.steps]
         history = z.new_zeros(count, config.history_frames, z.shape[-1])
         frames = []
         for frame in range(z.shape[1]):
-            told = history.flatten(1)
+            context = history.flatten(1)
             if self.global_encoder is not None:
-                here = self.embed("audio", heard[:, frame : frame + 1]) if embedding is None else embedding[:, [frame]]
+                here = (
+                    self.embed("audio", windows[:, frame : frame + 1]) if embedding is None else embedding[:, [frame]]
+                )
                 feature = self.fuse(self.embed("pose", history[:, None]), here.expand(count, -1, -1))
-                told = torch.cat([told, feature[:, 0]], dim=-1)
+                context = torch.cat([context, feature[:, 0]], dim=-1)
             x = z[:, frame]
             if not precompute:
-                told = torch.cat([told, known[frame].expand(count, -1)], dim=-1)[:, None]
+                context = torch.cat([context, audio_flat[frame].expand(count, -1)], dim=-1)[:, None]
             for number in range(len(self.steps) - 1, -1, -1):
                 step = self.steps[number]
                 if precompute:
-                    x, states[number] = _cells(step, splits[number], frame, x, told, matrices[number], states[number])
+                    x, states[number] = _cells(
+                        step, splits[number], frame, x, context, matrices[number], states[number]
+                    )
                 else:
-                    x, states[number] = step.inverse(x.reshape(count, 1, -1), told, matrices[number], states[number])
+                    x, states[number] = step.inverse(x.reshape(count, 1, -1), context, matrices[number], states[number])
             x = x.reshape(count, -1)
             frames.append(x)
             history = torch.cat([history[:, 1:], x[:, None]], dim=1)
         return torch.stack(frames, dim=1)
 
-    def _split(self, coupling: Coupling, known: Tensor) -> Split:
-        weight, border = coupling.recurrent.weight_ih_l0, coupling.kept + self.told_width
+    def _split(self, coupling: Coupling, audio_flat: Tensor) -> Split:
+        weight, border = coupling.recurrent.weight_ih_l0, coupling.kept + self.context_width
         return Split(
-            weight[:, :border].contiguous(), functional.linear(known, weight[:, border:], coupling.recurrent.bias_ih_l0)
+            weight[:, :border].contiguous(),
+            functional.linear(audio_flat, weight[:, border:], coupling.recurrent.bias_ih_l0),
         )
 
     def _rest(self, count: int, like: Tensor) -> list[Any]:
@@ -260,13 +265,13 @@ class Twin(nn.Module):
 
 
 def _cells(
-    step: Step, split: Split, frame: int, y: Tensor, told: Tensor, matrix: Tensor, states: list[Any]
+    step: Step, split: Split, frame: int, y: Tensor, context: Tensor, matrix: Tensor, states: list[Any]
 ) -> tuple[Tensor, list[Any]]:
-    """:meth:`Step.inverse` of one frame, the audio's share in the place of the first layer's bias."""
+    """:meth:`Step.inverse` of one frame, with the audio's share in place of the first layer's bias."""
     coupling = step.coupling
     recurrent, after = coupling.recurrent, []
     kept, changed = y[:, : coupling.kept], y[:, coupling.kept :]
-    x, weight, bias = torch.cat([kept, told], dim=-1), split.weight, split.known[frame]
+    x, weight, bias = torch.cat([kept, context], dim=-1), split.weight, split.audio_gates[frame]
     for layer, state in enumerate(states):
         if layer:
             weight, bias = getattr(recurrent, f"weight_ih_l{layer}"), getattr(recurrent, f"bias_ih_l{layer}")

@@ -1,4 +1,4 @@
-"""Our parameters of the stylized flow in its PyTorch twin, and the twin's gradients in the shape of ours."""
+"""Our parameters of the stylized flow in its PyTorch twin, and the twin's gradients in our shapes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ from experiments.benchmarks.torch_flow import Twin
 
 
 def _places(twin: Twin, number: int) -> dict[str, Any]:
-    """Of one step, where each of our arrays lies: a tensor and its columns; None where it is not transposed."""
+    """Place of each of our arrays of one step: a tensor and its columns; None where it is not transposed."""
     step = twin.steps[number]
     recurrent, kept = step.coupling.recurrent, step.coupling.kept
     invertible = step.invertible
@@ -28,7 +28,7 @@ def _places(twin: Twin, number: int) -> dict[str, Any]:
         if layer:
             layers[f"layer_{layer}"]["input_kernel"] = (weight, everything)
         else:
-            border = kept + twin.told_width
+            border = kept + twin.context_width
             columns = {"kept": slice(kept), "history": slice(kept, border), "known": slice(border, None)}
             layers["layer_0"] |= {f"{name}_kernel": (weight, part) for name, part in columns.items()}
     return {
@@ -45,7 +45,7 @@ def _places(twin: Twin, number: int) -> dict[str, Any]:
 
 
 def _of(place: tuple[Tensor, slice | None], tensor: Tensor) -> Tensor:
-    """What of a tensor, or of its gradient, is one of our arrays; a view."""
+    """The view of a tensor, or of its gradient, that is one of our arrays."""
     columns = place[1]
     return tensor if columns is None else tensor[:, columns].T
 
@@ -54,7 +54,7 @@ def _walk(places: Mapping[str, Any], params: Mapping[str, Any] | None, act: Any,
     """``act(place, array, path)`` for every array of a step, as a tree.
 
     Raises:
-        ValueError: the arrays are not those of the places.
+        ValueError: the arrays differ from those of the places.
     """
     if params is not None and set(params) != set(places):
         raise ValueError(f"Expected the parameters {sorted(places)} in {path or 'a step'}; got {sorted(params)}.")
@@ -88,7 +88,7 @@ def load_params(twin: Twin, params: Mapping[str, Any]) -> None:
 
 
 def gradients(twin: Twin) -> dict[str, Any]:
-    """Gradients of all parameters as a tree shaped like ours; zeros for what is not trained."""
+    """Gradients of all parameters as a tree shaped like ours; zeros where a parameter is not trained."""
 
     def gradient(place: Any, *_: Any) -> np.ndarray:
         tensor = place[0]

@@ -1,7 +1,7 @@
-"""PyTorch's side of the layers that Audio2Gestures is made of, with the names that Flax gives ours.
+"""PyTorch's side of the layers of Audio2Gestures, with the names of Flax.
 
 Activations lie as (clips, channels, frames). Where PyTorch has a kernel of its own (recurrent layers, attention, layer
-normalisation), it is used, so that ours are held against something that was written apart from them.
+normalisation), it is used, so that ours are compared with an independent implementation.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from torch.nn.functional import conv1d
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.networks import LOG_VARIANCE_BOUND
 
-#: Flax's.
+#: As in Flax.
 NORM_EPSILON = 1e-6
 
 
@@ -76,7 +76,7 @@ class Gaussian(NamedTuple):
     log_variance: Tensor
 
     def shift(self, noise: Tensor) -> Tensor:
-        """The draw that standard normal noise stands for."""
+        """The draw for standard normal noise."""
         return self.mean + torch.exp(0.5 * self.log_variance) * noise
 
 
@@ -121,7 +121,7 @@ class BandHead(nn.Module):
 
 
 class GRU(nn.Module):
-    """PyTorch's recurrent layer with parameters named and laid out as ours."""
+    """PyTorch's recurrent layer with the names and layout of our parameters."""
 
     def __init__(self, inputs: int, features: int, reverse: bool) -> None:
         super().__init__()
@@ -135,13 +135,13 @@ class GRU(nn.Module):
         frames = x.permute(2, 0, 1)
         weights = [self.input_kernel[..., 0], self.state_kernel[..., 0], self.input_bias, self.state_bias]
         state = frames.new_zeros(1, frames.shape[1], self.state_kernel.shape[1])
-        seen = frames.flip(0) if self.reverse else frames
-        states, _ = torch.gru(seen, state, weights, True, 1, 0.0, False, False, False)
+        inputs = frames.flip(0) if self.reverse else frames
+        states, _ = torch.gru(inputs, state, weights, True, 1, 0.0, False, False, False)
         return (states.flip(0) if self.reverse else states).permute(1, 2, 0)
 
 
 class BidirectionalGRU(nn.Module):
-    """Layers of a GRU that reads forwards and one that reads backwards."""
+    """Layers of a forward and a backward GRU."""
 
     def __init__(self, inputs: int, layers: int, features: int) -> None:
         super().__init__()
@@ -158,7 +158,7 @@ class BidirectionalGRU(nn.Module):
 
 
 class LayerNorm(nn.Module):
-    """Over channels."""
+    """Layer normalisation over channels."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -170,7 +170,7 @@ class LayerNorm(nn.Module):
 
 
 class LocalAttention(nn.Module):
-    """One head, with a bias for each distance and nothing beyond ``reach`` frames."""
+    """One head, with a bias for each distance and no attention beyond ``reach`` frames."""
 
     def __init__(self, channels: int, reach: int) -> None:
         super().__init__()
@@ -220,7 +220,7 @@ class Transformer(nn.Module):
 
 
 def add_backbone(module: nn.Module, config: Audio2GesturesConfig, inputs: int, channels: tuple[int, ...]) -> int:
-    """Give a module the body that ``config`` names, under the name that ours has, and say how wide its output is."""
+    """Add the backbone of ``config`` to a module, under the name of ours, and return the width of its output."""
     if config.backbone == "gru":
         module.BidirectionalGRU_0 = BidirectionalGRU(inputs, config.recurrent_layers, config.recurrent_channels)
         return 2 * config.recurrent_channels
@@ -232,7 +232,7 @@ def add_backbone(module: nn.Module, config: Audio2GesturesConfig, inputs: int, c
 
 
 def run_backbone(module: nn.Module, x: Tensor) -> Tensor:
-    """The output of what :func:`add_backbone` gave it."""
+    """Output of the backbone of :func:`add_backbone`."""
     name = next(name for name in ("TCN_0", "BidirectionalGRU_0", "Transformer_0") if hasattr(module, name))
     output: Tensor = getattr(module, name)(x)
     return output
@@ -241,7 +241,7 @@ def run_backbone(module: nn.Module, x: Tensor) -> Tensor:
 def add_head(
     module: nn.Module, config: Audio2GesturesConfig, inputs: int, hidden: int, number: int, shared: bool
 ) -> None:
-    """Give a module its ``number``-th head."""
+    """Add the ``number``-th head to a module."""
     if config.latent == "dct":
         head: nn.Module = BandHead(inputs, config.code_channels, config.dct_points, not shared)
         module.add_module(f"BandHead_{number}", head)
@@ -250,7 +250,7 @@ def add_head(
 
 
 def run_head(module: nn.Module, number: int, x: Tensor) -> Gaussian:
-    """The output of what :func:`add_head` gave it."""
+    """Output of the head of :func:`add_head`."""
     name = f"BandHead_{number}" if hasattr(module, f"BandHead_{number}") else f"GaussianHead_{number}"
     output: Gaussian = getattr(module, name)(x)
     return output

@@ -29,7 +29,7 @@ def ssim(predicted: Tensor, target: Tensor) -> Tensor:
     p, q = predicted - mean_p[:, None], target - mean_q[:, None]
     count = predicted.shape[1] - 1
     var_p, var_q, covariance = p.square().sum(1) / count, q.square().sum(1) / count, (p * q).sum(1) / count
-    # A joint that never moves has no spread, whose root has no gradient.
+    # A joint that never moves has zero variance, whose root has no gradient.
     spread_p, spread_q = (value.clamp(min=torch.finfo(p.dtype).tiny).sqrt() for value in (var_p, var_q))
     luminance = (2 * mean_p * mean_q + SSIM_C1) / (mean_p**2 + mean_q**2 + SSIM_C1)
     contrast = (2 * spread_p * spread_q + SSIM_C2) / (var_p + var_q + SSIM_C2)

@@ -1,8 +1,8 @@
 """A PyTorch twin of our Speech2Gesture: the same networks and losses, to compare values.
 
-Written from ``a2g_jax.models.speech2gesture``, with PyTorch's own convolutions. Activations lie as (clips, channels,
-frames) or (clips, channels, frames, bands). Submodules carry the names that Flax gives ours, so that parameters are
-copied and compared by name.
+Written from ``a2g_jax.models.speech2gesture``, with PyTorch's own convolutions. Activations have the layout (clips,
+channels, frames) or (clips, channels, frames, bands). Submodules have the names of Flax, so that parameters are copied
+and compared by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,12 +45,12 @@ def _same(inputs: int, outputs: int) -> Conv:
 
 
 def _strided(inputs: int, outputs: int, stride: int) -> Conv:
-    """Four taps. What an odd number of frames lacks for the last step of two is padded too."""
+    """Four taps. An odd number of frames is padded for the last step of two."""
     return Conv(inputs, outputs, (4,), (stride,), ((1, 2),))
 
 
 class LayerNorm(nn.Module):
-    """Of each frame over all else it holds, with a scale and an offset for each channel."""
+    """Layer normalisation of each frame over all its values, with a scale and an offset for each channel."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -65,7 +65,7 @@ class LayerNorm(nn.Module):
 
 
 class Activation(nn.Module):
-    """Layer normalisation, where wanted, and a leaky rectifier."""
+    """Layer normalisation, if requested, and a leaky rectifier."""
 
     def __init__(self, channels: int, normalise: bool) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class Activation(nn.Module):
 
 
 class AudioEncoder(nn.Module):
-    """Eight convolutions; the last one takes all bands that are left."""
+    """Eight convolutions; the last one covers all remaining bands."""
 
     def __init__(self, config: Speech2GestureConfig, bands: int) -> None:
         super().__init__()
@@ -179,7 +179,7 @@ class Twin(nn.Module):
         Args:
             mean: of the values of a pose, (R, D); so is their ``std``.
             positions: local rotations (..., J, 3, 3) and joint positions (..., J, 3) in metres of values (..., R, D)
-                in 6D; None where they are no rotations.
+                in 6D; None if they are not rotations.
         """
         super().__init__()
         self.generator = Generator(config, bands, mean.size)
@@ -261,7 +261,7 @@ def _as_theirs(array: np.ndarray) -> np.ndarray:
 
 
 def gradients(module: nn.Module, params: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Gradients by the flat names of our parameters and in their shapes; zeros where none arrived."""
+    """Gradients by the flat names of our parameters and in their shapes; zeros where there is none."""
     shapes = {name: array.shape for name, array in flatten_dict(dict(params), sep=".").items()}
     found = {}
     for name, value in module.named_parameters():

@@ -1,9 +1,9 @@
 """A PyTorch twin of our Audio2Gestures: the same networks and losses, to compare values and speed.
 
-Written from ``a2g_jax.models.audio2gestures``; equations and weights are the same, so are parameter counts. Two things
-are done the way PyTorch likes them instead of ours: activations lie as (clips, channels, frames), and rotation
-matrices come from plain Gram-Schmidt, without our fallback for degenerate vectors (which costs us a little).
-Submodules carry the names that Flax gives ours, so that parameters are copied and compared by name.
+Written from ``a2g_jax.models.audio2gestures``; equations, weights and parameter counts are the same. Two things follow
+PyTorch's conventions: activations have the layout (clips, channels, frames), and rotation matrices come from plain
+Gram-Schmidt, without our fallback for degenerate vectors (which costs us a little). Submodules have the names of Flax,
+so that parameters are copied and compared by name.
 """
 
 from collections.abc import Callable, Mapping
@@ -111,7 +111,7 @@ def geodesic_distance(first: Tensor, second: Tensor) -> Tensor:
 
 
 class Noise(NamedTuple):
-    """All that a training step draws: standard normal, each (clips, channels, frames)."""
+    """All draws of a training step: standard normal, each (clips, channels, frames)."""
 
     audio: Tensor
     """For the shared code of audio."""
@@ -124,11 +124,11 @@ class Noise(NamedTuple):
     second: Tensor
     """For the second."""
     mapped: Tensor
-    """For the draws from what both are mapped to; twice as many clips."""
+    """For the draws from both mapped distributions; twice as many clips."""
 
     @classmethod
     def draw(cls, clips: int, channels: int, frames: int) -> "Noise":
-        """From PyTorch's global generator."""
+        """Draw from PyTorch's global generator."""
         return cls(*(torch.randn(clips, channels, frames) for _ in range(5)), torch.randn(2 * clips, channels, frames))
 
 
@@ -225,7 +225,7 @@ class Twin(nn.Module):
         }
 
     def _motion_terms(self, pose: Tensor, rotations: Tensor) -> dict[str, Tensor]:
-        """Of the reconstruction and the translation, one after the other, against the truth."""
+        """Losses of the reconstruction and then the translation against the truth."""
         true_rotations = matrix_from_6d(pose)
         target, both = self.positions(true_rotations), self.positions(rotations)
         twice = torch.cat([target, target])
@@ -249,7 +249,7 @@ class Twin(nn.Module):
         return rotations[..., :2].transpose(-1, -2).flatten(2).transpose(1, 2)
 
     def _encode(self, encoder: nn.Module, x: Tensor) -> Any:
-        """Codes; with the DCT, of each block for itself."""
+        """Codes; with the DCT, each block on its own."""
         points = self.config.dct_points
         if self.config.latent != "dct":
             return encoder(x)
@@ -262,7 +262,7 @@ class Twin(nn.Module):
         return join(codes) if isinstance(codes, Gaussian) else tuple(join(code) for code in codes)
 
     def _in_time(self, code: Tensor) -> Tensor:
-        """A code as the decoder takes it."""
+        """A code in time, the decoder's input."""
         return block_dct(code, self.config.dct_points, inverse=True) if self.config.latent == "dct" else code
 
     def weights(self, step: int) -> dict[str, float]:
@@ -340,7 +340,7 @@ def load_params(module: nn.Module, params: Mapping[str, Any]) -> None:
 
 
 def gradients(module: nn.Module) -> dict[str, Any]:
-    """Gradients of all parameters as a tree shaped like our Flax parameters; zeros where none arrived."""
+    """Gradients of all parameters as a tree shaped like our Flax parameters; zeros where there is none."""
     tree: dict[str, Any] = {}
     for path, value in module.named_parameters():
         *folders, name = path.split(".")

@@ -1,4 +1,4 @@
-"""What the benchmarks work on: a skeleton, a corpus of random smooth motion, and settings; nothing is downloaded."""
+"""Workload of the benchmarks: a skeleton, a corpus of random smooth motion, and settings; nothing is downloaded."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -55,7 +55,7 @@ def make_corpus(folder: Path, frames: int, joints: int, seed: int) -> Corpus:
         mel=mel,
         body=skeleton,
         representation="6d",
-        recordings=(Entry("noise", 0, frames, "nobody", "", {}),),
+        recordings=(Entry("noise", 0, frames, "none", "", {}),),
         splits={"train": [Segment(0, 0, frames)]},
         recipe={"seed": seed},
         fingerprint="",
@@ -63,7 +63,7 @@ def make_corpus(folder: Path, frames: int, joints: int, seed: int) -> Corpus:
 
 
 def run_config(corpus: Corpus, preset: str, batch: int, frames: int, seed: int) -> RunConfig:
-    """A run of a preset, with the batch asked for and nothing else changed."""
+    """A run of a preset with the given batch size."""
     model = replace(PRESETS[preset], clip_frames=frames)
     training = replace(TRAIN_PRESETS[preset], batch_size=batch, seed=seed)
     return RunConfig.of("audio2gestures", preset, model, training, corpus)

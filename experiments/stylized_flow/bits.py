@@ -1,4 +1,4 @@
-"""Bits per dimension beside the scores of continued clips, and the row of the conditional Gaussian."""
+"""Bits per dimension in addition to the scores of continued clips, and the row of the conditional Gaussian."""
 
 from typing import Any
 
@@ -25,19 +25,19 @@ def continued_with_bits(protocol: Protocol) -> Score:
 
 
 def with_gaussian(table: str, where: Setting, variant: Variant) -> None:
-    """Score the Gaussian that is told what a flow is told, for every seed that has no record yet.
+    """Score the Gaussian with the context of a flow, for every seed without a record.
 
     Args:
-        variant: the flow; its clips, history, lookahead and noise are those of the Gaussian.
+        variant: the flow, whose clips, history, lookahead and noise the Gaussian has.
     """
     ruler, measured = measure(where)
     for seed in where.seeds:
-        wanted = {"variant": GAUSSIAN, "seed": seed, **measured, "steps": 0}
-        if any(wanted.items() <= record.items() for record in records(table)):
+        identity = {"variant": GAUSSIAN, "seed": seed, **measured, "steps": 0}
+        if any(identity.items() <= record.items() for record in records(table)):
             continue
         _, config = described("", variant, {}, seed, ruler.corpus, where)
         found = gaussian_bits_per_dim(config, ruler.corpus, seed=seed)
-        append(table, {**wanted, "floor": found.floor, "scores": {"bits_per_dim": _row(found)}})
+        append(table, {**identity, "floor": found.floor, "scores": {"bits_per_dim": _row(found)}})
 
 
 def _row(found: Likelihood) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Mean latents of clips, which is what the flow paper looks for styles in (Sec. 4.4)."""
+"""Mean latents of clips, in which the flow paper looks for styles (Sec. 4.4)."""
 
 import jax
 import numpy as np
@@ -11,7 +11,7 @@ from a2g_jax.training.run import Run
 
 
 def mean_latents(run: Run, corpus: Corpus, split: str) -> tuple[Float[np.ndarray, "N C"], list[str]]:
-    """Of the clips of a split, the mean over time of their latents, and who speaks in each."""
+    """Mean over time of the latents of each clip of a split, and the clip's speaker."""
     model, config = run.config.build(), run.config
     summarise = jax.jit(lambda params, batch: model.summarise(params, jax.random.key(0), batch)["latent_mean"])
     starts = clip_starts(config, corpus, split)

@@ -1,10 +1,10 @@
-"""Bits per dimension on held-out motion: flows beside the conditional Gaussian that is told the same.
+"""Bits per dimension on held-out motion: flows compared with the conditional Gaussian with the same context.
 
     python -m experiments.stylized_flow.likelihood RUN [RUN ...] --corpus CORPUS
 
-Of poses seen through the training's noise, on the test split; less is better. With 95 % intervals over clips, and of
-the paired difference from the Gaussian. Writes ``results/likelihood.json``. Runs can be compared only where clips,
-history, lookahead and noise are the same.
+Poses have the training's noise; test split; less is better. With 95 % intervals over clips, and of the paired
+difference from the Gaussian. Writes ``results/likelihood.json``. Runs can be compared only where clips, history,
+lookahead and noise are the same.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from experiments.tables.records import results
 
 
 def measure(run: Run, corpus: Corpus, seed: int) -> dict[str, Any]:
-    """A run and its Gaussian."""
+    """Bits of a run and of its Gaussian."""
     ours, gaussian = bits_per_dim(run, corpus, seed=seed), gaussian_bits_per_dim(run.config, corpus, seed=seed)
     difference = bootstrap_mean(ours.noisy_clips - gaussian.noisy_clips, np.random.default_rng(seed))
     return {

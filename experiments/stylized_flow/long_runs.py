@@ -2,9 +2,9 @@
 
     python -m experiments.stylized_flow.long_runs RUN [RUN ...] --corpus CORPUS [--frames 5000] [--samples 8]
 
-The speech is that of test recordings one after another. Of every stretch of ten seconds: the wrists' mean speed, the
-share of frames that are frozen (no wrist faster than 1 cm/s), the distance of the mean pose from the corpus's, and how
-wide poses spread; each beside what the corpus itself has in stretches as long. Writes ``results/long_runs.json``.
+The speech is that of test recordings one after another. For every stretch of ten seconds: the wrists' mean speed, the
+share of frozen frames (no wrist faster than 1 cm/s), the distance of the mean pose from the corpus's, and the spread of
+poses; each compared with equally long stretches of the corpus. Writes ``results/long_runs.json``.
 """
 
 import argparse
@@ -26,7 +26,7 @@ FROZEN = 0.01
 
 
 def liveliness(body: Body, pose: Float[np.ndarray, "T R D"], mean: Float[np.ndarray, "P _"], fps: float) -> Any:
-    """Of every stretch of ten seconds: speed (m/s), frozen share, drift (cm) and spread (cm)."""
+    """For every stretch of ten seconds: speed (m/s), frozen share, drift (cm) and spread (cm)."""
     places, frames = body.places(pose), round(STRETCH * fps)
     count = len(places) // frames
     rows = []

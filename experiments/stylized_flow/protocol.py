@@ -1,8 +1,8 @@
 """The flow paper's two protocols: clips continued from their first poses (Sec. 4.1), and their scores (Sec. 4.2).
 
-TED: 42 frames at 15 fps, 12 given and 30 made. Trinity: 120 frames at 20 fps, 5 given, 95 made, and 20 of lookahead.
-Only frames that are made are scored. Every row of a table is scored on the same clips and frames, whatever history it
-needs itself.
+TED: 42 frames at 15 fps, 12 given and 30 generated. Trinity: 120 frames at 20 fps, 5 given, 95 generated, and 20 of
+lookahead. Only generated frames are scored. Every row of a table is scored on the same clips and frames, whatever
+history it needs itself.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ from experiments.tables.runs import Ruler
 
 @dataclass(frozen=True)
 class Protocol:
-    """Which frames of which clips are made and scored."""
+    """Frames and clips that are generated and scored."""
 
     frames: int
-    """Of a clip."""
+    """Frames of a clip."""
     first: int
-    """The first that is made."""
+    """First generated frame."""
     last: int
-    """One behind the last."""
+    """One after the last generated frame."""
     most: int = 64
-    """Clips of the test split that are scored, evenly spread over it."""
+    """Maximum number of scored clips, evenly spread over the test split."""
 
 
 TED = Protocol(42, 12, 42)
@@ -87,14 +87,14 @@ def scores_of(
     onsets = [beats.mel_onsets(one[inner], corpus.fps) for one in audio]
     places = [[body.places(sample) for sample in clip] for clip in made]
     per_clip: dict[str, list[list[float]]] = {name: [] for name in ("position_l1", "pck", "beat_alignment", "jerk")}
-    for clip, target, heard in zip(places, truth, onsets, strict=True):
+    for clip, target, speech in zip(places, truth, onsets, strict=True):
         near = body.near(target)
         distance = [np.abs(sample - target) for sample in clip]
         per_clip["position_l1"].append([body.scale * float(d.sum(-1).mean()) for d in distance])
         per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])
         moves = [beats.motion_beats(sample, corpus.fps, smoothing=2.0 / corpus.fps) for sample in clip]
         sigma = beats.FLOW_SIGMA_FRAMES / corpus.fps
-        per_clip["beat_alignment"].append([beats.beat_alignment(m, heard, sigma) for m in moves if len(heard)])
+        per_clip["beat_alignment"].append([beats.beat_alignment(m, speech, sigma) for m in moves if len(speech)])
         per_clip["jerk"].append([_jerk(body, sample, corpus.fps) for sample in clip])
     rng = np.random.default_rng(seed)
     summary = {name: _summary(name, values, rng) for name, values in per_clip.items()}
@@ -102,7 +102,7 @@ def scores_of(
         spread = [body.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
         summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
     if len(made) > 1:
-        # Between the first samples of different clips, as the paper has it; not within a long motion.
+        # Between the first samples of different clips, as in the paper; not within a long motion.
         apart = body.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
         summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
     if ruler.network is not None:
@@ -125,7 +125,7 @@ def _summary(name: str, values: list[list[float]], rng: np.random.Generator) -> 
 
 
 def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str, Any]]:
-    """Scores of what is no model: the truth, another clip's motion, and the mean pose."""
+    """Scores of baselines: the truth, another clip's motion, the first pose held, and the mean pose."""
     starts = starts_of(ruler.corpus, protocol)
     _, pose = clips_of(ruler.corpus, protocol, starts)
     inner = pose[:, protocol.first : protocol.last]
@@ -134,7 +134,7 @@ def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str
         mean = mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
     candidates = {
         "truth": inner,
-        # A take may have one clip alone.
+        # A take may have a single clip.
         **({"another clip's motion": np.roll(inner, len(inner) // 2, axis=0)} if len(inner) > 1 else {}),
         "first pose held": np.broadcast_to(pose[:, protocol.first - 1 : protocol.first], inner.shape),
         "mean pose": np.broadcast_to(mean[None, None], inner.shape),

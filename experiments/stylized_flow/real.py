@@ -5,9 +5,9 @@
     a2g prepare ted-expressive DIR --out TED --features stylized-flow-ted --random-split
     python -m experiments.stylized_flow.real --zeroeggs ZEGGS --beat BEAT --ted TED [--steps 100]
 
-A take of a minute says little of a method, and its end is one clip of the Trinity protocol or two. There is no feature
-network, because a network trained on a minute of motion measures nothing; so there is no FGD and no perceptual loss.
-Weights trained on research-only recordings stay where ``--runs`` puts them.
+A take of a minute says little about a method, and its end is one or two clips of the Trinity protocol. There is no
+feature network, because one trained on a minute of motion would not be informative; so there is no FGD and no
+perceptual loss. Weights trained on research-only recordings stay in the folder of ``--runs``.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ CLAIMS = (
     Claim("PCK is higher than MoGlow's", OURS, MOGLOW, "pck", 1),
     Claim("a model that averages has the higher PCK", S2G, OURS, "pck", 1),
     Claim("ours is multimodal, a model that averages is not", OURS, S2G, "multimodality", 1),
-    Claim("ours is the more multimodal beside Audio2Gestures", OURS, A2G, "multimodality", 1),
+    Claim("ours is more multimodal than Audio2Gestures", OURS, A2G, "multimodality", 1),
 )
 
 
@@ -43,8 +43,8 @@ def without_perceptual(protocol: str) -> dict[str, Variant]:
 
 
 def main() -> None:
-    """Train and score what is missing, and draw a table for each take."""
-    parser = arguments("Real takes: the first part trains, the end is scored", steps=100)
+    """Train and score what is missing, and render a table for each take."""
+    parser = arguments("Real takes: trained on the first part, scored on the end", steps=100)
     for name, protocol in TAKES.items():
         parser.add_argument(f"--{name}", type=Path, help=f"a corpus with the features of the {protocol} protocol")
     options = parser.parse_args()

@@ -1,7 +1,7 @@
-"""What the tables of the stylized flow have in common.
+"""Common settings of the tables of the stylized flow.
 
-All flows here have our linear first layer, so that the paper's own parts are what differs; MoGlow stands beside also
-as it was published, without it.
+All flows here have our linear first layer, so that only the paper's own parts differ; MoGlow is also trained as
+published, without it.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from typing import Any
 from experiments.stylized_flow.protocol import PROTOCOLS
 from experiments.tables.runs import Variant
 
-#: How flows are trained here: the published schedule and clipping, at a size and for a time that 2 cores allow.
+#: Training of flows: the published schedule and clipping, at a size and for a time that 2 cores allow.
 TRAINING: dict[str, Any] = {
     "batch_size": 16,
     "learning_rate": 1.5e-3,
@@ -25,14 +25,14 @@ TRAINING: dict[str, Any] = {
 MOGLOW = {"cell": "lstm", "freedom": 0.0, "global_channels": 0, "reverse_share": 0.0}
 
 #: Steps of MoGlow in the time of one step of the flow, measured by ``python -m experiments.stylized_flow.step_time``:
-#: it makes no motion in training and has no encoder. With the linear layer and without.
+#: it has no reverse pass and no encoder. With the linear layer and without.
 EQUAL: Mapping[str, Mapping[bool, float]] = {
     "trinity": {True: 1.4, False: 1.36},
     "ted": {True: 1.77, False: 1.79},
 }
 
-#: Steps of the models that are no flows, in the flow's. A step of theirs costs a fraction of the flow's, so they train
-#: for less time than the flow; the tables tell the seconds.
+#: Steps of the other models, in those of the flow. Their steps cost a fraction of the flow's, so they train for less
+#: time than the flow; the tables state the seconds.
 OTHERS = {"trinity": {"a2g": 1.0, "s2g": 0.5}, "ted": {"a2g": 0.5, "s2g": 0.3}}
 
 #: Clips and context of the protocols; with the flow's tiny networks otherwise.
@@ -44,7 +44,7 @@ PERCEPTUAL = {"perceptual_weight": 0.1}
 
 
 def flow(protocol: str, **changes: Any) -> Variant:
-    """A flow on a protocol's clips, with its perceptual loss unless that is changed."""
+    """A flow on a protocol's clips, with its perceptual loss unless changed."""
     return Variant({**CLIPS[protocol], **PERCEPTUAL, **changes}, model="stylized_flow", training=TRAINING)
 
 
@@ -52,7 +52,7 @@ def moglow(protocol: str, predictor: bool) -> Variant:
     """MoGlow on a protocol's clips, trained for as long as the flow.
 
     Args:
-        predictor: with the linear first layer, which was not published.
+        predictor: with the linear first layer, which is ours.
     """
     changes = {**CLIPS[protocol], **MOGLOW, "predictor": predictor}
     return Variant(changes, model="stylized_flow", training=TRAINING, steps=EQUAL[protocol][predictor])

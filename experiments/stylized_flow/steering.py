@@ -1,11 +1,11 @@
-"""Whether the hands do what style controls ask for (MoGlow as StyleGestures has it, Alexanderson et al. 2020).
+"""Response of the hands to style controls (MoGlow as in StyleGestures, Alexanderson et al. 2020).
 
     a2g train stylized_flow --corpus CORPUS --out RUN --style-controls height,speed,radius
     python -m experiments.stylized_flow.steering RUN --corpus CORPUS [--speeches 6] [--samples 2]
 
-Each control is asked for at the 10th, 50th and 90th percentile of the training clips, the others at their medians, for
-the same test speeches and seeds. Measured: mean height, speed and radius of the hands that were made, beside what was
-asked for. Writes ``results/steering.json`` and a picture.
+Each control is set to the 10th, 50th and 90th percentile of the training clips, the others to their medians, for the
+same test speeches and seeds. Measured: mean height, speed and radius of the generated hands, compared with the request.
+Writes ``results/steering.json`` and a picture.
 """
 
 import argparse
@@ -32,7 +32,7 @@ SECONDS = 20.0
 
 
 def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) -> dict[str, Any]:
-    """What was asked for and what came, control by control."""
+    """Requested and measured values, control by control."""
     config = run.config.model_config
     names = [name for name in config.style_controls if name in HandStyle._fields]
     if not names:
@@ -40,7 +40,7 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
     training = np.asarray(run.summary["control_mean"])
     frames = round(SECONDS * corpus.fps)
     segments = [s for s in corpus.segments("test") if s.frames >= frames][:speeches]
-    heard = [np.asarray(corpus.audio[s.start : s.start + frames], np.float32) for s in segments]
+    features = [np.asarray(corpus.audio[s.start : s.start + frames], np.float32) for s in segments]
     rng = np.random.default_rng(seed)
     controls: dict[str, Any] = {}
     for name in names:
@@ -48,13 +48,13 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
         for percentile in PERCENTILES:
             curves = (f"{name}={percentile:g}",)
             made = replace(run, config=replace(run.config, model_config=replace(config, control_curves=curves)))
-            styles = styles_of(made, corpus, heard, samples, seed)
+            styles = styles_of(made, corpus, features, samples, seed)
             column = config.style_controls.index(name)
             rows.append(
                 {
                     "percentile": percentile,
                     "asked": float(np.percentile(training[:, column], percentile)),
-                    # One value for each speech: its samples are no independent draws of it.
+                    # One value for each speech: its samples are not independent.
                     **{
                         field: bootstrap_mean(styles[:, :, HandStyle._fields.index(field)].mean(1), rng)._asdict()
                         for field in HandStyle._fields
@@ -62,27 +62,27 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
                 }
             )
         controls[name] = {"rows": rows, **_response(name, rows)}
-    return {"steps": run.steps, "speeches": len(heard), "samples": samples, "controls": controls}
+    return {"steps": run.steps, "speeches": len(features), "samples": samples, "controls": controls}
 
 
 def styles_of(
-    run: Run, corpus: Corpus, heard: list[Float[np.ndarray, "T bands"]], samples: int, seed: int
+    run: Run, corpus: Corpus, features: list[Float[np.ndarray, "T bands"]], samples: int, seed: int
 ) -> Float[np.ndarray, "N samples 3"]:
     """Hand style of every motion."""
     body, generator = Body(corpus.body, corpus.representation), Generator(run)
     return np.array(
-        [[hand_style(body.places(rows), corpus.fps) for rows in generator.rows(one, samples, seed)] for one in heard]
+        [[hand_style(body.places(rows), corpus.fps) for rows in generator.rows(one, samples, seed)] for one in features]
     )
 
 
 def _response(name: str, rows: list[dict[str, Any]]) -> dict[str, float]:
-    """Rise of what came from the first percentile to the last, over the rise of what was asked for."""
-    came, asked = (rows[-1][name]["mean"] - rows[0][name]["mean"]), (rows[-1]["asked"] - rows[0]["asked"])
-    return {"response": came / asked}
+    """Rise of the measured value from the first percentile to the last, over that of the requested one."""
+    measured, requested = (rows[-1][name]["mean"] - rows[0][name]["mean"]), (rows[-1]["asked"] - rows[0]["asked"])
+    return {"response": measured / requested}
 
 
 def picture(figures: dict[str, Any], path: Path) -> None:
-    """Asked for and made, a panel for each control."""
+    """Plot requested and measured values, a panel for each control."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -91,15 +91,15 @@ def picture(figures: dict[str, Any], path: Path) -> None:
     controls = figures["controls"]
     figure, axes = pyplot.subplots(1, len(controls), figsize=(4 * len(controls), 3.6), squeeze=False)
     for axis, (name, found) in zip(axes[0], controls.items(), strict=True):
-        asked = [row["asked"] for row in found["rows"]]
+        requested = [row["asked"] for row in found["rows"]]
         values = [row[name] for row in found["rows"]]
         means = [value["mean"] for value in values]
         spread = np.abs(np.array([[value["low"], value["high"]] for value in values]).T - means)
-        axis.plot(asked, asked, color="0.7", linestyle="--", label="as asked")
-        axis.errorbar(asked, means, yerr=spread, marker="o", capsize=3, label="made")
+        axis.plot(requested, requested, color="0.7", linestyle="--", label="requested")
+        axis.errorbar(requested, means, yerr=spread, marker="o", capsize=3, label="generated")
         axis.set_title(f"{name}: response {found['response']:.2f}", fontsize=10)
-        axis.set_xlabel(f"asked for, {UNITS[name]} (10th, 50th, 90th percentile)")
-        axis.set_ylabel(f"of the hands that were made, {UNITS[name]}")
+        axis.set_xlabel(f"requested, {UNITS[name]} (10th, 50th, 90th percentile)")
+        axis.set_ylabel(f"generated, {UNITS[name]}")
     axes[0, 0].legend(frameon=False)
     figure.tight_layout()
     figure.savefig(path, dpi=110)

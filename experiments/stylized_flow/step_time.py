@@ -1,10 +1,10 @@
-"""How many steps MoGlow does in the time of one step of the flow, at the tables' sizes.
+"""Steps of MoGlow in the time of one step of the flow, at the tables' sizes.
 
     taskset -c 0 python -m experiments.stylized_flow.step_time --corpus TRINITY --features FEATURES \\
         --corpus-ted TED --features-ted FEATURES_TED [--rounds 5]
 
-The flow and both MoGlows take turns on one batch, so that what else the machine does meets all of them; medians over
-the turns. Writes ``results/step_time.json``, of which ``settings.EQUAL`` was taken.
+The flow and both MoGlows take turns on one batch, so that other load on the machine affects all of them alike; medians
+over the turns. Writes ``results/step_time.json``, the source of ``settings.EQUAL``.
 """
 
 import os
@@ -28,12 +28,12 @@ from experiments.stylized_flow.table1 import ted_arguments
 from experiments.tables.records import results
 from experiments.tables.runs import Setting, Variant, arguments, described, setting
 
-#: Steps of a turn: one in five makes motion, so a multiple of five, and enough for that share to be about right.
+#: Steps of a turn: one in five has the reverse pass, so a multiple of five, and enough to approximate that share.
 TURN = 40
 
 
 def stepper(variant: Variant, corpus: Corpus, where: Setting) -> Callable[[], None]:
-    """Goes on by one turn, on a batch that is there already."""
+    """Return a function that trains for one turn on a fixed batch."""
     _, config = described("", variant, {}, 0, corpus, where)
     model, settings = config.build(), config.train_config
     state = init_state(model, stage_spans(model, settings), settings.seed)
@@ -55,7 +55,7 @@ def stepper(variant: Variant, corpus: Corpus, where: Setting) -> Callable[[], No
 
 
 def measure(protocol: str, where: Setting, rounds: int) -> dict[str, Any]:
-    """Seconds of a step of each, and how many steps MoGlow does in one of the flow's."""
+    """Seconds of a step of each, and steps of MoGlow in one of the flow's."""
     corpus = Corpus.open(where.corpus)
     contenders = {
         "stylized flow": flow(protocol),

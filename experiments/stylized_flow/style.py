@@ -1,12 +1,12 @@
-"""Whether a clip's style arrives, and whether the rhythm still follows the new speech (Sec. 4.5, Fig. 8).
+"""Transfer of a clip's style, and agreement of the rhythm with the new speech (Sec. 4.5, Fig. 8).
 
     python -m experiments.stylized_flow.style RUN --corpus CORPUS [--pairs 12] [--samples 3]
 
-Speech of one speaker of the generated corpus is gestured to plainly, and with the latents of a clip of another
-speaker, both newly generated. Measured: how far mean height, speed and radius of the hands go from plain motion to the
-clip's (in units of how much speakers differ, as a projection); what a classifier of speakers, trained on the corpus's
-own motion, thinks; and agreement of the wrists' speed with the speech beside that of the same motion shifted. Writes
-``results/style.json``.
+Motion is generated for speech of one speaker of the generated corpus, plainly and with the latents of a clip of another
+speaker, both newly generated. Measured: the way of mean height, speed and radius of the hands from plain motion to the
+clip's (a projection, in units of the spread over speakers); the probability of the clip's speaker by a classifier
+trained on the corpus's own motion; and agreement of the wrists' speed with the speech, also of shifted motion.
+Writes ``results/style.json``.
 """
 
 import argparse
@@ -34,7 +34,7 @@ from a2g_jax.training.run import open_run
 from experiments.tables.records import results
 
 SECONDS = 20.0
-#: Mode, share of style, and whether motion goes on from the clip's last poses instead of the mean pose.
+#: Mode, share of style, and whether motion continues from the clip's last poses instead of the mean pose.
 SETTINGS = (
     *(("repeat", 0.7, False), ("repeat", 0.9, False), ("repeat", 1.0, False), ("repeat", 0.9, True)),
     *(("repeat", 1.0, True), ("statistics", 0.9, False)),
@@ -42,14 +42,14 @@ SETTINGS = (
 
 
 def clip_features(pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, " F"]:
-    """What the classifier sees of a clip: mean and deviation of every value, and of its steps."""
+    """Features for the classifier: mean and standard deviation of every value, standard deviation of its steps."""
     flat = pose.reshape(len(pose), -1)
     steps = np.diff(flat, axis=0)
     return np.concatenate([flat.mean(axis=0), flat.std(axis=0), 10.0 * steps.std(axis=0)])
 
 
 def speaker_classifier(corpus: Corpus) -> tuple[Any, float, dict[str, HandStyle]]:
-    """Trained on stretches of the training split; its accuracy on the test split; mean hand style of each speaker."""
+    """Classifier trained on the training split, its accuracy on the test split, and each speaker's hand style."""
     frames = round(SECONDS * corpus.fps)
     body = Body(corpus.body, corpus.representation)
 
@@ -74,18 +74,18 @@ def speaker_classifier(corpus: Corpus) -> tuple[Any, float, dict[str, HandStyle]
 
 
 def projection(source: HandStyle, target: HandStyle, made: HandStyle, unit: Float[np.ndarray, " 3"]) -> float:
-    """How far the made style went along the way from source to target, all three in units of the speakers' spread."""
+    """Share of the way from source to target that the generated style covers, in units of the speakers' spread."""
     way, went = (np.array(target) - source) / unit, (np.array(made) - source) / unit
     return float(way @ went / (way @ way))
 
 
 def mean_style(motions: Any) -> HandStyle:
-    """Of several motions."""
+    """Mean hand style of several motions."""
     return HandStyle(*np.mean([hand_style(one.positions(), one.fps) for one in motions], axis=0))
 
 
 def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) -> dict[str, Any]:
-    """Everything, for each setting."""
+    """All measures for each setting."""
     run = open_run(run_name)
     space, fps = FlowSpace(run, window=512), run.config.fps
     model, accuracy, styles = speaker_classifier(corpus)
@@ -110,14 +110,14 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
         conditions = {"plain": plain, "the clip itself": [clip.motion]}
         for mode, share, seeded in SETTINGS:
             style = Style(latents, mode=mode, share=share)
-            # Nothing is left to chance of a clip repeated whole.
+            # A clip repeated with share 1 is deterministic.
             count = 1 if (mode, share) == ("repeat", 1.0) else samples
             before = clip.motion if seeded else None
             name = f"{mode}, share {share:g}" + (", after the clip" if seeded else "")
             conditions[name] = space.generate(speech.audio, count, number, style, before)
         for name, motions in conditions.items():
-            heard = clip.audio if name == "the clip itself" else speech.audio
-            found = [agreement_with_null(one, heard, 16000) for one in motions]
+            audio = clip.audio if name == "the clip itself" else speech.audio
+            found = [agreement_with_null(one, audio, 16000) for one in motions]
             rows.setdefault(name, []).append(
                 {
                     "way": projection(source, target, mean_style(motions), unit),

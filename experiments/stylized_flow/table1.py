@@ -1,4 +1,4 @@
-"""Table 1: the flow beside MoGlow, Audio2Gestures and Speech2Gesture, by the protocols of Trinity and of TED.
+"""Table 1: the flow compared with MoGlow, Audio2Gestures and Speech2Gesture, by the protocols of Trinity and TED.
 
     a2g prepare talker --out TRINITY --minutes 90 --seed 6 --features stylized-flow
     a2g prepare talker --out TED --minutes 90 --seed 6 --view ted --features stylized-flow-ted
@@ -8,7 +8,7 @@
 The feature networks were made by ``a2g train motion_autoencoder --steps 2000`` with ``--clip-frames 64`` and 30.
 
 MoGlow is trained for as long as the flow, not for as many steps: once as published, once with our linear first layer.
-Without a corpus the tables are drawn from the records that there are.
+Without a corpus the tables are rendered from the existing records.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from experiments.tables.runs import Variant, arguments, setting
 OURS, MOGLOW, LINEAR = "stylized flow", "MoGlow", "MoGlow with the linear layer"
 A2G, S2G = "Audio2Gestures", "Speech2Gesture without GAN"
 
-#: As the paper words them; the sign says which way.
+#: In the paper's words; the sign is the direction.
 CLAIMS = (
     Claim("FGD is lower than MoGlow's", OURS, MOGLOW, "fgd", -1),
     Claim("PCK is higher than MoGlow's", OURS, MOGLOW, "pck", 1),
@@ -72,14 +72,14 @@ def rows(protocol: str) -> dict[str, Variant]:
 
 
 def ted_arguments(parser: argparse.ArgumentParser) -> None:
-    """The flags of the second protocol's corpus."""
+    """Flags of the second protocol's corpus."""
     parser.add_argument("--corpus-ted", type=Path, help="bone directions at 15 fps")
     parser.add_argument("--features-ted", type=Path, help="a run of motion_autoencoder on it, clips of 30 frames")
 
 
 def main() -> None:
-    """Train and score what is missing, and draw both tables."""
-    parser = arguments("Table 1: the flow beside the models that there are", steps=700)
+    """Train and score what is missing, and render both tables."""
+    parser = arguments("Table 1: the flow compared with other models", steps=700)
     ted_arguments(parser)
     parser.add_argument("--steps-ted", type=int, default=600, help="training steps on TED (default: 600)")
     options = parser.parse_args()

@@ -1,8 +1,8 @@
-"""Table 2: what the global encoder and the gesture perceptual loss add, by the protocol of TED.
+"""Table 2: effect of the global encoder and of the gesture perceptual loss, by the protocol of TED.
 
     python -m experiments.stylized_flow.table2 --corpus TED --features FEATURES_TED [--budget MINUTES]
 
-The baseline is MoGlow with GRUs for its LSTMs, as in the paper. Bits per dimension on held-out motion stand beside.
+The baseline is MoGlow with GRUs for its LSTMs, as in the paper. Bits per dimension on held-out motion are added.
 """
 
 from experiments.stylized_flow.bits import continued_with_bits, with_gaussian
@@ -39,7 +39,7 @@ PAPER = {
 
 
 def main() -> None:
-    """Train and score what is missing, and draw the table."""
+    """Train and score what is missing, and render the table."""
     options = arguments("Table 2: the components of the flow", steps=600).parse_args()
     if options.corpus is not None:
         where, only = setting(options), options.only.split(",") if options.only else None

@@ -1,11 +1,11 @@
-"""Table 3 and Fig. 8: how well the speakers are grouped in the space of latents, beside MoGlow's.
+"""Table 3 and Fig. 8: grouping of speakers in the latent space, compared with MoGlow's.
 
     python -m experiments.stylized_flow.table3 --corpus TED --features FEATURES_TED [--budget MINUTES]
 
 The runs are those of Table 1. Latents of a clip are averaged over time and brought to two dimensions by t-SNE; CHI and
 silhouette are taken there, as the paper does, and in the full space, both *against the speakers* (the public code
-scores the labels of its own clustering). Beside them the same for speakers shuffled over the clips, and for the labels
-of a clustering (k-means, as many clusters as speakers), which says how well *any* cloud falls into pieces. Draws
+scores the labels of its own clustering). In addition the same for speakers shuffled over the clips, and for the labels
+of a clustering (k-means, as many clusters as speakers), which shows how well *any* cloud can be partitioned. Writes
 ``results/table3.png``.
 """
 
@@ -68,7 +68,7 @@ def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
 
 
 def own_clusters(flat: Float[np.ndarray, "N 2"], count: int, seed: int) -> dict[str, float]:
-    """What the public code scores: clusters that were found in the very same points."""
+    """Labels that the public code scores: clusters of the same points."""
     from sklearn.cluster import KMeans
 
     labels = KMeans(count, n_init=10, random_state=seed).fit_predict(flat)
@@ -102,7 +102,7 @@ def picture(found: list[dict[str, Any]]) -> None:
 
 
 def main() -> None:
-    """Train and score what is missing; draw the table and the picture."""
+    """Train and score what is missing; render the table and the picture."""
     options: argparse.Namespace = arguments("Table 3: speakers in the space of latents", steps=600).parse_args()
     if options.corpus is not None:
         compute(TABLE, VARIANTS, setting(options), options.only.split(",") if options.only else None, score, "speakers")

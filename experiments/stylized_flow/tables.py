@@ -1,4 +1,4 @@
-"""Rows beside the models."""
+"""Baseline rows."""
 
 from experiments.stylized_flow.protocol import Protocol, nulls
 from experiments.tables.records import append, records
@@ -6,7 +6,7 @@ from experiments.tables.runs import Setting, measure
 
 
 def with_nulls(table: str, where: Setting, protocol: Protocol) -> None:
-    """Score the truth, another clip's motion and poses that stand still, once for a corpus and a feature network."""
+    """Score the truth, another clip's motion and static poses, once for a corpus and a feature network."""
     ruler, measured = measure(where)
     if any(record["steps"] == 0 and measured.items() <= record.items() for record in records(table)):
         return

@@ -1,1 +1,1 @@
-"""Tables of the papers: variants trained with several seeds, records kept, claims judged, Markdown drawn."""
+"""Tables of the papers: variants trained with several seeds, records kept, claims judged, Markdown rendered."""

@@ -1,4 +1,4 @@
-"""Scores over seeds, and what they say of a paper's claims."""
+"""Scores over seeds, and verdicts on a paper's claims."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -49,14 +49,14 @@ def difference(table: str, first: str, second: str, metric: str) -> tuple[float,
 
 @dataclass(frozen=True)
 class Claim:
-    """Something the paper says of a table, as an inequality between two rows."""
+    """A claim of the paper about a table, as an inequality between two rows."""
 
     text: str
     first: str
     second: str
     metric: str
     sign: int
-    """1 where ``first`` is said to score more than ``second``, -1 for less."""
+    """1 if the claim is that ``first`` scores more than ``second``, -1 for less."""
 
 
 def judge(table: str, claim: Claim) -> str:

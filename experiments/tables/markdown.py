@@ -32,7 +32,7 @@ COLUMNS = (
     "diversity",
     "multimodality",
 )
-#: Behind them, by paper.
+#: Columns after them, by paper.
 _OTHERS = {
     "audio2gestures": ("beat_alignment",),
     "stylized_flow": (
@@ -43,7 +43,7 @@ _OTHERS = {
 _T_SNE = "stylized flow, Table 3"
 METRICS = {
     **SCORED,
-    "bits_per_dim": Metric("bits per dimension", "", "lower", "held-out poses, seen through the training's noise", 3),
+    "bits_per_dim": Metric("bits per dimension", "", "lower", "held-out poses with the training's noise", 3),
     "chi_full": Metric("CHI, full space", "", "higher", _T_SNE, 1),
     "silhouette_full": Metric("silhouette, full space", "", "higher", _T_SNE),
     "chi_shuffled": Metric("CHI, speakers shuffled", "", "truth", _T_SNE, 1),
@@ -62,7 +62,7 @@ def make(
     paper: Mapping[str, str],
     steps: int = 1000,
 ) -> None:
-    """The command of a table: train and score what is missing, and draw it; without a corpus, only draw it."""
+    """Command of a table: train and score what is missing, and render it; without a corpus, only render it."""
     options = arguments(title, steps).parse_args()
     if options.corpus is not None:
         compute(table, variants, setting(options), options.only.split(",") if options.only else None)
@@ -86,9 +86,9 @@ def compute(
 def draw(
     table: str, title: str, variants: Mapping[str, Variant], claims: Sequence[Claim], paper: Mapping[str, str]
 ) -> None:
-    """Write a table's Markdown beside its records, and print it; nothing while there are no records."""
+    """Write a table's Markdown next to its records, and print it; does nothing without records."""
     if not current(table):
-        print(f"{table}: nothing is measured yet; name a corpus with --corpus.")
+        print(f"{table}: there are no records yet; give a corpus with --corpus.")
         return
     text = render(table, title, list(variants), claims, paper)
     path_of(table, ".md").write_text(text + "\n", encoding="utf-8")
@@ -102,7 +102,7 @@ def render(
     claims: Sequence[Claim],
     paper: Mapping[str, str],
 ) -> str:
-    """Markdown with our table, what the paper reports and whether its claims hold here."""
+    """Markdown with our table, the paper's figures and verdicts on its claims."""
     found = current(table)
     columns = [
         name for name in (*COLUMNS, *_OTHERS[table.split("/")[0]]) if any(name in record["scores"] for record in found)
@@ -117,13 +117,13 @@ def render(
             lines.append(f"| {name} | {seeds} | {' | '.join(cells)} |")
     lines += ["", "Means over seeds +- half of a 95 % interval; in brackets the best of the samples.", ""]
     if claims:
-        lines += ["What the paper says, checked on our data (differences paired by seed):", ""]
+        lines += ["The paper's claims, checked on our data (differences paired by seed):", ""]
         lines += [f"- {claim.text}: **{judge(table, claim)}**" for claim in claims]
         lines.append("")
     if paper:
         lines += [
             "The paper's figures, on **other data** (Trinity, S2G-Ellen or TED), another skeleton and another feature"
-            " network; they cannot be compared with ours in value, only in order:",
+            " network; they are comparable with ours only in order, not in value:",
             "",
             *(f"- {name}: {text}" for name, text in paper.items()),
             "",
@@ -132,7 +132,7 @@ def render(
 
 
 def _unit(name: str, found: Sequence[Mapping[str, Any]]) -> str:
-    """Lengths are centimetres and metres, or the corpus's own unit where it has no metres."""
+    """Unit of a column: centimetres or metres, or the corpus's own unit if it has no metres."""
     unit = METRICS[name].unit
     if any(record.get("unit", "cm") != "cm" for record in found):
         unit = unit.replace("cm", "units").replace("m/", "units/")
@@ -160,14 +160,14 @@ def _budget(found: Sequence[Mapping[str, Any]]) -> list[str]:
     unequal = any(record.get("trained_steps", record["steps"]) != record["steps"] for record in trained)
     return [
         f"Corpus {', '.join(corpora)}; the tiny preset, {', '.join(map(str, steps))} steps a run,"
-        f" {len(trained)} records, {minutes:.0f} minutes of training on 2 cores beside other work;"
+        f" {len(trained)} records, {minutes:.0f} minutes of training on 2 cores shared with other work;"
         f" {trained[0]['samples']} samples of {trained[0]['clips']} test clips.",
         *(_training(trained) if unequal else []),
     ]
 
 
 def _training(trained: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Steps and processor time of each row, where the steps are not the same for all."""
+    """Steps and processor time of each row, where steps differ between rows."""
     rows = {record["variant"]: record["trained_steps"] for record in trained}
     seconds = {name: [record["train_cpu_seconds"] for record in trained if record["variant"] == name] for name in rows}
     return ["", "Training, in steps and seconds of one core (mean over seeds):", ""] + [

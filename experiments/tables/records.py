@@ -1,8 +1,8 @@
-"""What was measured, as lines of JSON: one for each variant and seed.
+"""Measurements as lines of JSON: one for each variant and seed.
 
 A table is named by its paper and its own name, ``audio2gestures/table2``; its records lie in
-``experiments/audio2gestures/results/table2.jsonl``, so that an experiment that was stopped goes on where it was, and a
-table can be drawn from what there is.
+``experiments/audio2gestures/results/table2.jsonl``, so that an experiment is resumable and a table can be rendered from
+existing records.
 """
 
 import hashlib
@@ -14,17 +14,17 @@ from typing import Any
 
 from a2g_jax.data.corpus import Corpus
 
-#: What records of one table have in common, beside the steps of those that were trained.
+#: Fields that the records of one table share, in addition to the steps of trained ones.
 _MEASURED = ("corpus", "feature_network", "samples")
 
 EXPERIMENTS = Path(__file__).parents[1]
 
-#: What tells one record of a table from another.
+#: Fields that identify a record of a table.
 _IDENTITY = ("variant", "seed", "corpus", "feature_network", "steps", "samples")
 
 
 def name_of(corpus: Corpus) -> str:
-    """What records call a corpus: a digest of its arrays, or of its recipe if it was generated.
+    """Name of a corpus in records: a digest of its arrays, or of its recipe if it was generated.
 
     The same recipe gives the same recordings everywhere, but processors differ in the last bits of a sum.
     """
@@ -35,7 +35,7 @@ def name_of(corpus: Corpus) -> str:
     return f"talker {hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:9]}"
 
 
-#: What of a recipe decides on the recordings.
+#: Fields of a recipe that determine the recordings.
 _RECIPE = frozenset({"minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"})
 
 
@@ -57,18 +57,18 @@ def all_tables(paper: str) -> Iterator[str]:
 
 
 def records(table: str) -> list[dict[str, Any]]:
-    """What was measured for a table so far."""
+    """Records of a table so far."""
     path = path_of(table)
     if not path.exists():
         return []
     found = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    # Two processes that worked at once may both have scored what has no training.
+    # Two concurrent processes may both have scored the untrained rows.
     return list({tuple(record.get(name) for name in _IDENTITY): record for record in found}.values())
 
 
 def current(table: str) -> list[dict[str, Any]]:
-    """Records that can stand in one table: those of the corpus, feature network, samples and steps of the last trained
-    one, and what has no training on the same corpus and network."""
+    """Records that fit into one table: those with the corpus, feature network, samples and steps of the last trained
+    one, and untrained rows on the same corpus and network."""
     found = records(table)
     trained = [record for record in found if record["steps"] > 0]
     if not trained:

@@ -1,4 +1,4 @@
-"""What the tables share: train a variant with a seed if that was not done yet, score it, keep the record."""
+"""Common part of the tables: train a variant with a seed if there is no record, score it, keep the record."""
 
 import argparse
 import hashlib
@@ -24,40 +24,40 @@ from experiments.tables.records import all_tables, append, name_of, records
 
 @dataclass(frozen=True)
 class Variant:
-    """A row of a table: a model, its preset and what is changed in it."""
+    """A row of a table: a model, its preset and changes of its settings."""
 
     changes: Mapping[str, Any]
     model: str = "audio2gestures"
     preset: str = "tiny"
     training: Mapping[str, Any] | None = None
-    """Changes of the tiny preset's settings of training."""
+    """Changes of the tiny preset's training settings."""
     generation: Mapping[str, Any] | None = None
-    """Changes of settings that act in generation alone, made after training the variant of that name."""
+    """Changes of settings that act only in generation, applied after training."""
     trained_as: str = ""
-    """The variant whose weights it takes; empty for its own."""
+    """Variant whose weights are used; empty for its own."""
     steps: float = 1.0
-    """Steps of its training, in those of the table: above 1 where a step costs less and computing is to be equal."""
+    """Training steps relative to the table's: above 1 for cheaper steps at equal computing."""
 
 
 @dataclass(frozen=True)
 class Ruler:
-    """What is measured with, the same for all rows of a table."""
+    """Means of measurement, the same for all rows of a table."""
 
     corpus: Corpus
     network: FeatureNetwork | None
     samples: int
 
 
-#: ``score(name, run, ruler, seed) -> what a record says beside its conditions``: "scores", and more if there is more.
+#: ``score(name, run, ruler, seed) -> fields of a record in addition to its conditions``: "scores", and others.
 Score = Callable[[str, Run, Ruler, int], dict[str, Any]]
 
 
-#: What :func:`whole_recordings` is called in records.
+#: Name of :func:`whole_recordings` in records.
 WHOLE = "whole recordings"
 
 
 def whole_recordings(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
-    """Scores on whole test recordings, and whether the model listens: what ``a2g evaluate --audit`` says."""
+    """Scores and listening audit on whole test recordings, as by ``a2g evaluate --audit``."""
     result = evaluate(
         {name: run},
         ruler.corpus,
@@ -76,7 +76,7 @@ def whole_recordings(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, 
 
 @dataclass(frozen=True)
 class Setting:
-    """Where runs are made, on what, and how long."""
+    """Folder of runs, corpus, and length of training."""
 
     corpus: Path
     features: Path | None
@@ -86,29 +86,29 @@ class Setting:
     samples: int
     seeds: tuple[int, ...]
     minutes: float
-    """No new training begins after so long."""
+    """Minutes after which no new training starts."""
 
 
 def arguments(description: str, steps: int = 1000) -> argparse.ArgumentParser:
-    """The flags that all tables have.
+    """Command line of all tables.
 
     Args:
-        steps: of the records that are committed, so that the plain command goes on with them.
+        steps: of the committed records, so that the plain command continues from them.
     """
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only drawn")
+    parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only rendered")
     parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it")
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="folder for trained runs (default: runs)")
     parser.add_argument("--steps", type=int, default=steps, help="training steps of each run (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=20)
     parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: 0,1,2)")
-    parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training begins")
+    parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training starts")
     parser.add_argument("--only", help="variants, comma-separated (default: all)")
     return parser
 
 
 def setting(options: argparse.Namespace) -> Setting:
-    """What the flags say."""
+    """The setting given by the flags."""
     seeds = tuple(int(seed) for seed in options.seeds.split(","))
     return Setting(
         options.corpus, options.features, options.runs, options.steps, options.samples, seeds, options.budget
@@ -136,11 +136,11 @@ def run_table(
         for name, variant in variants.items():
             if only is not None and name not in only:
                 continue
-            wanted = {"variant": name, "seed": seed, **conditions}
-            if any(all(record.get(key) == value for key, value in wanted.items()) for record in records(table)):
+            fields = {"variant": name, "seed": seed, **conditions}
+            if any(all(record.get(key) == value for key, value in fields.items()) for record in records(table)):
                 continue
             if (time.monotonic() - began) / 60 > where.minutes:
-                print(f"{table}: the budget of {where.minutes:g} minutes is used up; run it again to go on")
+                print(f"{table}: the budget of {where.minutes:g} minutes is used up; run the command again to continue")
                 return
             digest, config = described(name, variant, variants, seed, corpus, where)
             twin = _same(table, digest, conditions, scored)
@@ -151,7 +151,7 @@ def run_table(
             if variant.trained_as:
                 seconds = computing = 0.0  # counted with the variant that was trained
             record = {
-                **wanted,
+                **fields,
                 "settings": digest,
                 "scored": scored,
                 "model": variant.model,
@@ -167,31 +167,31 @@ def run_table(
 
 
 def baselines(table: str, where: Setting) -> None:
-    """Score the truth and what is neither it nor a model, once for a corpus and a feature network."""
-    ruler, wanted = measure(where)
+    """Score the truth and the other baselines, once for a corpus and a feature network."""
+    ruler, fields = measure(where)
 
     def found(name: str) -> list[dict[str, Any]]:
         return [
             record
             for record in records(name)
-            if record["steps"] == 0 and all(record.get(key) == value for key, value in wanted.items())
+            if record["steps"] == 0 and all(record.get(key) == value for key, value in fields.items())
         ]
 
     if found(table):
         return
-    # Those of another table of the same corpus are the same.
+    # Records of another table on the same corpus are valid here.
     rows = next((found(name) for name in all_tables(table.split("/")[0]) if found(name)), None)
     if rows is None:
         result = evaluate({}, ruler.corpus, samples=where.samples, seed=0, network=ruler.network)
         rows = [
-            {"variant": row["name"], "seed": 0, **wanted, "steps": 0, "scores": row["scores"]} for row in result["rows"]
+            {"variant": row["name"], "seed": 0, **fields, "steps": 0, "scores": row["scores"]} for row in result["rows"]
         ]
     for row in rows:
         append(table, row)
 
 
 def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
-    """What is measured with, and what of it a record notes."""
+    """The ruler of a setting, and the fields that identify it in records."""
     corpus = Corpus.open(where.corpus)
     network = None if where.features is None else load_feature_network(where.features, corpus)
     measured = {
@@ -205,12 +205,12 @@ def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
 def described(
     name: str, variant: Variant, variants: Mapping[str, Variant], seed: int, corpus: Corpus, where: Setting
 ) -> tuple[str, RunConfig]:
-    """The run that a variant is made of, and a digest of everything that its scores depend on."""
+    """Configuration of a variant's run, and a digest of everything that its scores depend on."""
     made = variants.get(variant.trained_as or name, variant)
     steps = round(where.steps * made.steps)
     preset = find_model(made.model).presets[made.preset]
     config = replace(preset, **made.changes)
-    # Ramps that end before the training does.
+    # Ramps must end before training does.
     ramps = {
         name: min(getattr(config, name), steps // 3)
         for name in ("kl_ramp_steps", "alignment_ramp_steps")
@@ -237,7 +237,7 @@ def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | N
 
 
 def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -> dict[str, Any] | None:
-    """The record of a variant of any table of the paper that is the same under another name, and scored alike."""
+    """Record of an identical variant with the same scoring in any table of the paper, whatever its name."""
     for name in all_tables(table.split("/")[0]):
         for record in records(name):
             same = record.get("settings") == digest and record.get("scored", WHOLE) == scored
@@ -247,13 +247,13 @@ def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -
 
 
 def _trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Run, float, float]:
-    """The run of a variant, trained now if it was not before, and the seconds of the call that finished it: passed,
-    and computed."""
+    """Run of a variant, trained if necessary, and the seconds of the call that finished it: wall clock and
+    processor."""
     folder = where.runs / _digest(config, corpus, None)
     began, computed = time.monotonic(), time.process_time()
     train(config, corpus, folder, resume=True, progress=False)
     spent = folder / "seconds.json"
-    # Another table may ask for the run again; its training took what it took.
+    # Another table may need the same run; its training time is that of the first call.
     if not spent.exists():
         write_json(spent, [time.monotonic() - began, time.process_time() - computed])
     seconds, computing = json.loads(spent.read_text(encoding="utf-8"))

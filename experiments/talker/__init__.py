@@ -1,1 +1,1 @@
-"""What the generated corpus is like: one module for each table or figure. See README.md."""
+"""Measurements of the generated corpus: one module for each table or figure. See README.md."""

@@ -2,7 +2,7 @@
 
     python -m experiments.talker [--only timing hidden ...] [--seed 0] [--shared ../shared] [--page]
 
-`--page` renders README.md from the JSON files that are there, and runs nothing.
+`--page` only renders README.md from the existing JSON files.
 """
 
 import argparse
@@ -19,21 +19,21 @@ PARTS = (timing.PART, hidden.PART, predictable.PART, emotions.PART, realism.PART
 PAGE = Path(__file__).parent / "README.md"
 _HEAD = """# The generated corpus, measured
 
-Everything below was measured by the modules of this folder and rendered by `python -m experiments.talker --page` from
-the JSON files in `results/`; no number was typed. Run all of it, from the repository root, by
+Everything below is measured by the modules of this folder and rendered by `python -m experiments.talker --page` from
+the JSON files in `results/`; no number is typed. Run all of it, from the repository root, by
 
     pip install -e ".[experiments]"
     python -m experiments.talker
 
-or one part by the command above its tables. A few small real recordings, which are not in this repository, are needed
-for the comparison with real takes (`--shared FOLDER`); without them it shows the generated side alone.
+or one part by the command above its tables. The comparison with real takes needs a few small real recordings, which are
+not in this repository (`--shared FOLDER`); without them it shows only the generated side.
 
-Intervals are 95 %; a null is what the same measure says when the relation it looks for is destroyed.
+Intervals are 95 %; a null is the value of the same measure when the relation it tests is destroyed.
 """
 
 
 def page(folder: Path, pictures: Path) -> str:
-    """The text of README.md from the results that are there."""
+    """Text of README.md from the existing results."""
     sections = [_HEAD]
     for part in PARTS:
         path = folder / f"{part.name}.json"
@@ -53,13 +53,13 @@ def page(folder: Path, pictures: Path) -> str:
 
 
 def arguments_of(part: Part, options: argparse.Namespace) -> list[str]:
-    """What is handed on to one part."""
+    """Arguments passed on to one part."""
     arguments = ["--seed", str(options.seed), "--workers", str(options.workers)]
     return [*arguments, "--shared", str(options.shared)] if part is realism.PART else arguments
 
 
 def main() -> None:
-    """Run what was asked for, then render the page."""
+    """Run the requested parts, then render the page."""
     names = [part.name for part in PARTS]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=names, default=names)

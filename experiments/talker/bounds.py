@@ -1,10 +1,10 @@
-"""What is true on average: multimodality, and what metrics say about right and about unrelated motion.
+"""Expected values of the truth: multimodality, and scores of right and of unrelated motion.
 
     python -m experiments.talker.bounds [--takes 3] [--draws 20] [--seed 0]
 
-For each recording many right motions are drawn. Multimodality is the mean distance between two of them. A metric's
+Many right motions are drawn for each recording. Multimodality is the mean distance between two of them. A metric's
 ceiling is its mean over right motions of the recording, its floor that over right motions of another recording of the
-same speaker. Standard errors of one recording are those of its draws; of a speaker and of all, those of recordings.
+same speaker. Standard errors are over draws for one recording, and over recordings for a speaker and for all.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from experiments.talker.common import Part, cast_evenly, parallel, run_part, tab
 
 _WRISTS = [BODY_JOINTS.index("L_Wrist"), BODY_JOINTS.index("R_Wrist")]
 SIGMA = 0.1
-#: Seconds from a stroke's fastest moment to its syllable's energy peak, as `experiments.first_light` takes it.
+#: Seconds from a stroke's fastest moment to its syllable's energy peak, as in `experiments.first_light`.
 LEAD = 0.15
 DISTANCES = {
     "wrists, mean distance, cm": "wrists",
@@ -40,7 +40,7 @@ SCORES = {
 
 
 def places(motion: Motion) -> np.ndarray:
-    """(T, J, 3) centimetres relative to the root."""
+    """Joint positions (T, J, 3) relative to the root, centimetres."""
     return 100 * (motion.positions() - np.asarray(motion.root)[:, None])
 
 
@@ -72,7 +72,7 @@ def score_function(recording: Recording, what: str) -> Any:
 
 
 def measure(roles: tuple[dict[str, Any], dict[str, Any]], draws: int) -> dict[str, Any]:
-    """All figures of one recording; the second role is another one of the same speaker."""
+    """All figures of one recording; the second role is another recording of the same speaker."""
     recording, other = (talk(**role) for role in roles)
     key = roles[0]["seed"]
     figures: dict[str, Any] = {"name": recording.name, "speaker": recording.speaker, "emotion": recording.emotion}

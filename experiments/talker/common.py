@@ -1,4 +1,4 @@
-"""What the experiments share: arguments, processes, intervals, tables, JSON."""
+"""Common part of the experiments: arguments, processes, intervals, tables, JSON."""
 
 import argparse
 import datetime
@@ -22,13 +22,13 @@ from a2g_jax.talker.speakers import SPEAKERS
 ROOT = Path(__file__).parents[2]
 RESULTS = Path(__file__).parent / "results"
 PICTURES = ROOT / "docs" / "pictures"
-#: Where the machine and the reader's folders appear in the arguments, which results must not repeat.
+#: Arguments that name the machine's or the reader's folders, which results must not repeat.
 _PLACES = ("out", "pictures", "shared")
 _In, _Out = TypeVar("_In"), TypeVar("_Out")
 
 
 class Part(NamedTuple):
-    """One experiment: what it computes, and how its results are shown from JSON alone."""
+    """One experiment: its computation, and the rendering of its results from JSON."""
 
     name: str
     title: str
@@ -39,7 +39,7 @@ class Part(NamedTuple):
 
 
 def parse(part: Part, arguments: list[str] | None = None) -> argparse.Namespace:
-    """The options of one experiment; defaults are what the README shows."""
+    """Options of one experiment; defaults are those of the README."""
     parser = argparse.ArgumentParser(prog=f"python -m experiments.talker.{part.name}", description=part.title)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)")
@@ -82,7 +82,7 @@ def _flags(settings: dict[str, Any]) -> Iterator[str]:
 
 
 def rounded(value: Any) -> Any:
-    """Plain JSON values, floats to four significant digits; what is not finite becomes None."""
+    """Plain JSON values, floats to four significant digits; values that are not finite become None."""
     if isinstance(value, dict):
         return {str(key): rounded(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -93,7 +93,7 @@ def rounded(value: Any) -> Any:
 
 
 def parallel(function: Callable[[_In], _Out], items: Iterable[_In], workers: int) -> list[_Out]:
-    """``map`` on several processes, in order, with a count of what is done on standard error."""
+    """``map`` on several processes, in order, with a progress count on standard error."""
     items = list(items)
     if workers < 2 or len(items) < 8:  # starting a process costs as much as a few recordings
         return list(map(function, items))
@@ -119,7 +119,7 @@ def cast_evenly(
     emotions: Iterable[str] = tuple(VOICE_EMOTIONS),
     rooms: bool = True,
 ) -> list[dict[str, Any]]:
-    """Arguments of ``talk``: every speaker in every emotion ``repeats`` times; every other one heard in a room."""
+    """Arguments of ``talk``: every speaker in every emotion ``repeats`` times; every other one in a room."""
     rng = np.random.default_rng([seed, 31])
     cells = [cell for cell in product(speakers, emotions) for _ in range(repeats)]
     return [
@@ -161,7 +161,7 @@ def table(rows: Iterable[Iterable[Any]], headings: Iterable[str]) -> str:
 
 
 def show(value: Any) -> str:
-    """One cell: three significant digits, pairs as ``low to high``, nothing as a dash."""
+    """One cell: three significant digits, pairs as ``low to high``, a missing value as a dash."""
     if value is None:
         return "-"
     if isinstance(value, list | tuple):

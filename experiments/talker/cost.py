@@ -1,10 +1,10 @@
-"""What a minute of talk costs: seconds of computing, memory, disk.
+"""Cost of a minute of talk: seconds of computing, memory, disk.
 
     python -m experiments.talker.cost [--repeats 5] [--minutes 24] [--seed 0]
 
 Each row runs in a process of its own. Seconds are medians of repeats after warm-up, for a recording of a minute; a
-corpus is prepared from nothing each time, start of its processes included. Memory is the largest resident one of the
-process, and of its largest child.
+corpus is prepared from nothing each time, including the start of its processes. Memory is the largest resident memory
+of the process, and of its largest child.
 """
 
 import argparse
@@ -38,7 +38,7 @@ CORPORA = {
 
 
 def stage(name: str, seed: int) -> Any:
-    """A function that does one stage for a minute of talk."""
+    """Return a function that runs one stage for a minute of talk."""
     from a2g_jax.data.generated import TalkerOptions, generate_rows
     from a2g_jax.data.settings import Features
     from a2g_jax.features.mel import MelConfig, log_mel
@@ -89,7 +89,7 @@ def corpus(name: str, minutes: float, seed: int, repeats: int) -> dict[str, Any]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much, how often."""
+    """Add the length of corpora and the number of repeats."""
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--minutes", type=float, default=24.0, help="length of the corpora")
 
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def one(arguments: argparse.Namespace) -> None:
-    """One contender, in this process, reported to the one that started it."""
+    """Run one contender in this process and report to the one that started it."""
     if arguments.contender in STAGES:
         measure.report(measure.measure(stage(arguments.contender, arguments.seed), arguments.repeats))
         return
@@ -121,20 +121,20 @@ def tables(result: dict[str, Any]) -> str:
     headings += ["of a child, MB", "disk, MB an hour", "share of the cores others took"]
     return (
         f"Stages on recordings of {result['recording_seconds']:g} s, corpora of {result['minutes']:g} minutes from "
-        "nothing. Where others took a share of the cores, it would be faster alone; a corpus of several processes "
-        f"cannot tell its own from others.\n\n{table(rows, headings)}"
+        "nothing. A row where others took a share of the cores would be faster alone; for a corpus with several "
+        f"processes, its own count as others.\n\n{table(rows, headings)}"
     )
 
 
-PART = Part("cost", "What it costs", add_arguments, run, tables)
+PART = Part("cost", "Cost", add_arguments, run, tables)
 
 if __name__ == "__main__":
-    known = argparse.ArgumentParser(add_help=False)
-    known.add_argument("--contender", choices=[*STAGES, *CORPORA])
-    known.add_argument("--repeats", type=int, default=5)
-    known.add_argument("--minutes", type=float, default=24.0)
-    known.add_argument("--seed", type=int, default=0)
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--contender", choices=[*STAGES, *CORPORA])
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--minutes", type=float, default=24.0)
+    parser.add_argument("--seed", type=int, default=0)
     if any(argument.startswith("--contender") for argument in sys.argv[1:]):
-        one(known.parse_args())
+        one(parser.parse_args())
     else:
         run_part(PART)

@@ -1,9 +1,9 @@
-"""Are emotions and speakers told apart by ear alone, and by eye alone?
+"""Classification of emotions and speakers from audio alone and from motion alone.
 
     python -m experiments.talker.emotions [--repeats 6] [--seconds 20] [--seed 0]
 
-One row of summary statistics a recording (audio at one level, every other one heard in a room), logistic regression
-and a random forest, cross-validated by recording.
+One row of summary statistics a recording (audio at one level, every other one in a room), logistic regression and a
+random forest, cross-validated by recording.
 """
 
 import argparse
@@ -68,7 +68,7 @@ def judge(rows: np.ndarray, labels: np.ndarray, classes: tuple[str, ...], name: 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How many recordings, how long."""
+    """Add the number and length of recordings."""
     parser.add_argument("--repeats", type=int, default=6, help="recordings of every speaker in every emotion")
     parser.add_argument("--seconds", type=float, default=20.0)
 
@@ -76,9 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> dict[str, Any]:
     """Emotions and speakers from audio and from motion."""
     roles = cast_evenly(options.repeats, options.seconds, options.seed)
-    heard, seen = (np.stack(part) for part in zip(*parallel(features, roles, options.workers), strict=True))
+    audio, motion = (np.stack(part) for part in zip(*parallel(features, roles, options.workers), strict=True))
     cells = [(what, sense, name) for what in LABELS for sense in ("audio", "motion") for name in MODELS]
-    data = {"audio": heard, "motion": seen}
+    data = {"audio": audio, "motion": motion}
     truth = {what: np.array([role[what] for role in roles]) for what in LABELS}
     tasks = [(data[sense], truth[what], LABELS[what], name) for what, sense, name in cells]
     results = parallel(partial(_judge_task, seed=options.seed), tasks, options.workers)
@@ -140,7 +140,7 @@ def picture(result: dict[str, Any], path: Path) -> None:
     plt.close(figure)
 
 
-PART = Part("emotions", "Emotions and speakers by ear and by eye", add_arguments, run, tables, picture)
+PART = Part("emotions", "Emotions and speakers from audio and from motion", add_arguments, run, tables, picture)
 
 if __name__ == "__main__":
     run_part(PART)

@@ -1,11 +1,11 @@
-"""Is what the corpus calls hidden really not in the audio?
+"""Whether the corpus's hidden choices are absent from the audio.
 
     python -m experiments.talker.hidden [--takes 10] [--permutations 20] [--seed 0]
 
-Hand, family, place and hold of each gesture unit, guessed from features of the audio around its strokes. One classifier
-a speaker, on neutral speech, cross-validated by recording: speakers and emotions differ in their preferences and are
-heard, so a pooled classifier gains by telling who speaks. Chance is the most frequent choice of the training folds.
-The same classifiers on features of the motion are the control that there is something to find.
+Hand, family, place and hold of each gesture unit are predicted from features of the audio around its strokes. One
+classifier a speaker, on neutral speech, cross-validated by recording: speakers and emotions differ in their preferences
+and are audible, so a pooled classifier gains by identifying the speaker. Chance is the most frequent choice of the
+training folds. The same classifiers on features of the motion are the positive control.
 """
 
 import argparse
@@ -43,13 +43,13 @@ def units(role: dict[str, Any]) -> list[dict[str, Any]]:
     rows = []
     for unit in truth["units"]:
         strokes = [truth["strokes"][index] for index in unit["strokes"]]
-        # The audio is looked at from its own syllables: apex times hold a hidden lead.
+        # Audio is taken around its own syllables: apex times contain a hidden lead.
         peaks = np.array([syllables[stroke["syllable"]]["peak"] for stroke in strokes])
         apexes = np.array([stroke["apex"] for stroke in strokes])
         rows.append(
             {
-                "audio": heard(voice, peaks),
-                "motion": seen(moves, speed, apexes),
+                "audio": audio_features(voice, peaks),
+                "motion": motion_features(moves, speed, apexes),
                 "speaker": role["speaker"],
                 "take": role["name"],
                 **{target: str(unit[target]) for target in TARGETS},
@@ -58,7 +58,7 @@ def units(role: dict[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
-def heard(voice: sound.Voice, peaks: np.ndarray) -> np.ndarray:
+def audio_features(voice: sound.Voice, peaks: np.ndarray) -> np.ndarray:
     """Audio around the strokes of a unit: mean and spread of bands, levels and pitch, wide and near, and its rhythm."""
     wide = np.arange(peaks[0] - 0.6, peaks[-1] + 0.6, 0.02)
     near = (peaks[:, None] + np.arange(-0.2, 0.2, 0.02)).ravel()
@@ -68,7 +68,7 @@ def heard(voice: sound.Voice, peaks: np.ndarray) -> np.ndarray:
         parts += [rows.mean(axis=0), rows.std(axis=0)]
     gaps = np.diff(peaks) if len(peaks) > 1 else np.zeros(1)
     ends = sound.frame_features(voice, peaks[[0, -1]])
-    # And as it sounds, not normalised: who speaks, how loud against the rest, how high.
+    # Unnormalised as well: voice, relative loudness, pitch.
     raw = voice.mel[np.clip(np.rint(wide * sound.RATE).astype(int), 0, len(voice.mel) - 1)]
     voiced = voice.f0[np.clip(np.rint(wide * sound.RATE).astype(int), 0, len(voice.f0) - 1)]
     pitch = 12 * np.log2(voiced[np.isfinite(voiced)] / 100.0)
@@ -77,7 +77,7 @@ def heard(voice: sound.Voice, peaks: np.ndarray) -> np.ndarray:
     return np.concatenate([*parts, *ends, raw.mean(axis=0).reshape(16, -1).mean(axis=1), high, rhythm])
 
 
-def seen(moves: movement.Paths, speed: np.ndarray, apexes: np.ndarray) -> np.ndarray:
+def motion_features(moves: movement.Paths, speed: np.ndarray, apexes: np.ndarray) -> np.ndarray:
     """Motion around the strokes of a unit: speed and place of both hands."""
     at = lambda times: np.clip(np.rint(times * movement.RATE).astype(int), 0, len(speed) - 1)  # noqa: E731
     stroke = at((apexes[:, None] + np.arange(-0.3, 0.05, 1 / 60)).ravel())
@@ -110,10 +110,10 @@ def model(name: str, seed: int) -> Any:
 
 
 def hits(name: str, rows: np.ndarray, labels: np.ndarray, takes: np.ndarray, seed: int) -> np.ndarray:
-    """Which units a classifier gets right that has not seen their recordings."""
+    """Units that a classifier predicts correctly, on recordings outside its training folds."""
     found = np.zeros(len(labels), bool)
     for train, test in GroupKFold(min(FOLDS, len(set(takes)))).split(rows, groups=takes):
-        # Where all that was heard says the same, there is nothing to learn but that.
+        # A single label in the training folds leaves only the majority.
         one = len(set(labels[train])) == 1
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
@@ -160,7 +160,7 @@ def compare(found: list[dict[str, np.ndarray]], takes: list[np.ndarray], seed: i
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much is generated, and how often labels are shuffled."""
+    """Add the amount of talk and the number of shuffles."""
     parser.add_argument("--takes", type=int, default=10, help="recordings of a minute for each speaker")
     parser.add_argument("--permutations", type=int, default=20)
 
@@ -179,12 +179,12 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         for group in members:
             owners.append((target, sense, name))
             tasks.append((name, data[sense][group], column(target)[group], takes[group], options.seed))
-    # Nulls are only in doubt for the audio; the motion's gain needs none.
-    heard_only = [index for index, owner in enumerate(owners) if owner[1] == "audio"]
+    # Only the audio needs a null; the motion's gain is far from chance.
+    audio_only = [index for index, owner in enumerate(owners) if owner[1] == "audio"]
     found: list[Any] = [None] * len(tasks)
     for indices, permutations in (
-        (heard_only, options.permutations),
-        ([index for index in range(len(tasks)) if index not in set(heard_only)], 0),
+        (audio_only, options.permutations),
+        ([index for index in range(len(tasks)) if index not in set(audio_only)], 0),
     ):
         results = parallel(partial(_task, permutations=permutations), [tasks[i] for i in indices], options.workers)
         for index, result in zip(indices, results, strict=True):
@@ -231,8 +231,8 @@ def tables(result: dict[str, Any]) -> str:
         f"recording, {result['folds']} folds; intervals by drawing recordings; {result['permutations']} shuffles.\n\n"
         f"From the audio, one classifier a speaker (should gain nothing):\n\n{table(rows, long)}\n"
         f"From the motion, one classifier a speaker (control):\n\n{table(control, short)}\n"
-        "From the audio, one classifier for all speakers; what it gains over the majority of all speakers is knowledge "
-        f"of who speaks:\n\n{table(pooled, short)}"
+        "From the audio, one classifier for all speakers; its gain over the majority of all speakers comes from "
+        f"identifying the speaker:\n\n{table(pooled, short)}"
     )
 
 

@@ -15,7 +15,7 @@ RATE = 60.0
 SMOOTHING = 0.05
 #: Hands rest while the faster wrist is slower than this (m/s) for :data:`REST_SECONDS`.
 REST_SPEED, REST_SECONDS = 0.10, 0.3
-#: A gesture stroke is a peak of the faster wrist's speed that stands out by so much (m/s).
+#: Prominence of the faster wrist's speed peak that counts as a gesture stroke (m/s).
 STROKE_PROMINENCE = 0.2
 
 
@@ -77,7 +77,7 @@ def smooth(path: np.ndarray, fps: float) -> np.ndarray:
 
 
 def derivative(path: np.ndarray, order: int) -> np.ndarray:
-    """Length of the derivative of a path: m/s, m/s^2, m/s^3."""
+    """Norm of the derivative of a path: m/s, m/s^2, m/s^3."""
     for _ in range(order):
         path = np.gradient(path, axis=0) * RATE
     return np.linalg.norm(path, axis=-1)
@@ -95,7 +95,7 @@ def stroke_peaks(speed: np.ndarray) -> np.ndarray:
 
 
 def summary(moves: Paths) -> dict[str, float]:
-    """Figures of one take that a table can hold."""
+    """Summary figures of one take, for a table."""
     figures: dict[str, float] = {}
     for order, name in ((1, "speed"), (2, "acceleration"), (3, "jerk")):
         for part, path in (("wrist", moves.wrists), ("head", moves.head)):

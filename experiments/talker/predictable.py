@@ -1,10 +1,10 @@
-"""What the corpus calls determined by the audio: can a simple regressor find it there?
+"""Whether a simple regressor finds in the audio what the audio determines.
 
     python -m experiments.talker.predictable [--repeats 1] [--seed 0]
 
 A logistic regression on a window of features (16 mel bands, two levels, pitch, voicing at nine times within +-0.4 s)
-says for every frame whether a stroke arrives there; a ridge regression on the same window says how large it is. Folds
-by recording. Beside it: the same guesses shifted against the strokes, and peaks of the energy alone.
+predicts for every frame whether a stroke arrives there; a ridge regression on the same window predicts its size. Folds
+by recording. For comparison: the same predictions shifted against the strokes, and peaks of the energy alone.
 """
 
 import argparse
@@ -72,7 +72,7 @@ def pick(curve: np.ndarray, threshold: float) -> np.ndarray:
 
 
 def matches(guesses: np.ndarray, strokes: np.ndarray) -> int:
-    """How many guesses and strokes pair off one to one within the tolerance, nearest pairs first."""
+    """Number of one-to-one pairs of predictions and strokes within the tolerance, nearest first."""
     if len(guesses) == 0 or len(strokes) == 0:
         return 0
     distance = np.abs(guesses[:, None] - strokes[None])
@@ -131,20 +131,20 @@ def judge(takes: list[dict[str, Any]], target: str, shifts: int, seed: int) -> d
         model = make_pipeline(StandardScaler(), LogisticRegression(C=0.01, max_iter=100))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
-            # Every second frame: neighbours say the same.
+            # Every second frame: neighbours are redundant.
             model.fit(
                 np.concatenate([takes[i]["features"][::2] for i in train]),
                 np.concatenate([labels[i][::2] for i in train]),
             )
         likely = lambda i: ndimage.gaussian_filter1d(model.decision_function(takes[i]["features"]), 1.0)  # noqa: B023, E731
-        # The energy's best lag against strokes is learned too.
+        # The best lag of the energy against strokes is learned as well.
         lag = max(
             range(8), key=lambda k: auc([np.roll(takes[i]["energy"], -k) for i in train], [labels[i] for i in train])
         )
         loud = lambda i: np.roll(takes[i]["energy"], -lag)  # noqa: B023, E731
         for name, curve in (("regressor", likely), ("energy alone", loud)):
-            known = [curve(i) for i in train]
-            height = best_threshold(known, [strokes[i] for i in train])
+            train_curves = [curve(i) for i in train]
+            height = best_threshold(train_curves, [strokes[i] for i in train])
             for i in test:
                 curves[name][i] = curve(i)
                 guesses[name][i] = pick(curves[name][i], height)
@@ -200,7 +200,7 @@ def size_score(takes: list[dict[str, Any]], target: str, shuffles: int, seed: in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much is generated."""
+    """Add the amount of talk."""
     parser.add_argument("--repeats", type=int, default=1, help="recordings of every speaker in every emotion")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--shifts", type=int, default=30, help="shifts and shuffles of the nulls")
@@ -247,7 +247,7 @@ def tables(result: dict[str, Any]) -> str:
         [[name, *(value[key] for key in keys)] for name, value in result["sizes"].items()],
         ["size of strokes", "strokes", "R^2", "95 %", "correlation", "R^2 of shuffled sizes, 95 % band"],
     )
-    size = f"{result['recordings']} recordings of {result['seconds']:g} s, every other one heard in a room; folds by "
+    size = f"{result['recordings']} recordings of {result['seconds']:g} s, every other one in a room; folds by "
     return f"{size}recording ({result['folds']}); intervals by drawing recordings.\n\n{first}\n{second}"
 
 

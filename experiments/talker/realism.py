@@ -1,4 +1,4 @@
-"""The generated corpus beside real takes, in figures.
+"""Figures of the generated corpus compared with real takes.
 
     python -m experiments.talker.realism [--repeats 1] [--seconds 60] [--shared ../shared] [--seed 0]
 
@@ -17,7 +17,7 @@ from experiments.talker import movement, sound
 from experiments.talker.common import ROOT, Part, cast_evenly, parallel, run_part, table
 from experiments.talker.takes import Take, generated_take, real_takes
 
-#: What each figure is called and its unit, in the order of the table.
+#: Name and unit of each figure, in the order of the table.
 ROWS: dict[str, str] = {
     **{
         f"{part}_{what}_p{p}": f"{part} {what} p{p}, {unit}"
@@ -44,12 +44,12 @@ ROWS: dict[str, str] = {
     "pause_share": "share of pauses (-25 dB, 0.2 s)",
 }
 FACTOR = 2.0
-#: On a scale without a zero a ratio says nothing: inside or outside of the range, widened by so much.
+#: Widening of the real range on scales without a zero, where a ratio has no meaning.
 _DIFFERENCES = {"log_mel_mean_db": 6.0}
 
 
 def describe(take: Take) -> dict[str, float]:
-    """All figures that a take can give."""
+    """All figures available for a take."""
     figures: dict[str, float] = {}
     if take.moves is not None:
         figures |= movement.summary(take.moves)
@@ -71,7 +71,7 @@ def average(figures: list[dict[str, float]]) -> dict[str, float]:
 
 
 def compare(key: str, value: float, real: list[float]) -> dict[str, Any]:
-    """A figure against the range of the real ones: how many times beyond its nearer end (1 inside)."""
+    """A figure compared with the range of the real ones: factor beyond its nearer end (1 inside)."""
     low, high = min(real), max(real)
     row: dict[str, Any] = {"generated": value, "real": [low, high]}
     if key in _DIFFERENCES:
@@ -83,7 +83,7 @@ def compare(key: str, value: float, real: list[float]) -> dict[str, Any]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much is generated; where real recordings lie."""
+    """Add the amount of talk and the folder of real recordings."""
     parser.add_argument("--repeats", type=int, default=1, help="recordings of every speaker in every emotion")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--shared", type=Path, default=ROOT.parent / "shared", help="folder with data/ of real takes")
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     figures = parallel(describe_role, roles, options.workers)
     takes, missing = real_takes(options.shared)
     real = {take.name: describe(take) for take in takes}
-    # A corpus as `a2g prepare talker` casts it is neutral half of the time.
+    # A corpus of `a2g prepare talker` is neutral half of the time.
     weights = [7.0 if role["emotion"] == "neutral" else 1.0 for role in roles]
     overall = {key: float(np.average([row[key] for row in figures], weights=weights)) for key in figures[0]}
     spread = {key: np.percentile([row[key] for row in figures], (5, 95)).tolist() for key in figures[0]}
@@ -108,8 +108,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     }
     rows = {}
     for key in ROWS:
-        known = [take[key] for take in real.values() if key in take]
-        rows[key] = compare(key, overall[key], known) if known else {"generated": overall[key]}
+        real_values = [take[key] for take in real.values() if key in take]
+        rows[key] = compare(key, overall[key], real_values) if real_values else {"generated": overall[key]}
     return {
         "recordings": len(roles),
         "seconds": options.seconds,
@@ -124,7 +124,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def tables(result: dict[str, Any]) -> str:
-    """Generated beside real, then speakers and emotions."""
+    """Generated and real takes, then speakers and emotions."""
     names = list(result["real"])
     lines = []
     for key, title in ROWS.items():
@@ -157,7 +157,7 @@ def tables(result: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
-PART = Part("realism", "Beside real takes", add_arguments, run, tables)
+PART = Part("realism", "Compared with real takes", add_arguments, run, tables)
 
 if __name__ == "__main__":
     run_part(PART)

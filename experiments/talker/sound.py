@@ -8,7 +8,7 @@ from scipy import ndimage, signal
 
 from a2g_jax.features.mel import MelConfig, active_level_db, log_mel
 
-#: Envelopes and pitch are sampled so often a second.
+#: Sampling rate of envelopes and pitch, Hz.
 RATE = 100.0
 
 
@@ -71,7 +71,7 @@ def modulation_peak(voice: Voice) -> float:
 
 
 def summary(voice: Voice) -> dict[str, float]:
-    """Figures of one recording that a table can hold."""
+    """Summary figures of one recording, for a table."""
     voiced = voice.f0[np.isfinite(voice.f0)]
     semitones = 12 * np.log2(voiced / np.median(voiced)) if len(voiced) else np.zeros(1)
     silent = pauses(voice)

@@ -1,4 +1,4 @@
-"""The real recordings that the generated corpus is put beside, as plain paths and audio."""
+"""Real recordings for comparison with the generated corpus, as plain paths and audio."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +16,7 @@ from experiments.talker import movement
 
 
 class Take(NamedTuple):
-    """What a recording can be asked for; None where it has none."""
+    """Data of a recording; None for what it lacks."""
 
     name: str
     moves: movement.Paths | None
@@ -26,7 +26,7 @@ class Take(NamedTuple):
 
 
 def real_takes(shared: Path) -> tuple[list[Take], list[str]]:
-    """All takes of the folder, and why others are missing."""
+    """All takes of the folder, and the reasons why others are missing."""
     takes, missing = [], []
     for name, reader in (
         ("BEAT", _beat),
@@ -101,7 +101,7 @@ def _ted(data: Path) -> Iterator[Take]:
 def ted_paths(directions: np.ndarray, fps: float) -> movement.Paths:
     """Paths from (T, 126) bone directions, on the talker's arm lengths; in the data y points down and z to the back.
 
-    Bones 0 to 4 lead from spine to neck, from neck to both shoulders, and down the left arm, 20 and 21 down the right.
+    Bones 0 to 4 are spine to neck, neck to both shoulders, and the left arm, 20 and 21 the right arm.
     """
     bones = directions.reshape(len(directions), 42, 3) * np.array([1.0, -1.0, -1.0])
     neck = 0.26 * bones[:, 0]

@@ -1,12 +1,12 @@
-"""When strokes arrive, against the syllables they belong to.
+"""Arrival of strokes relative to their syllables.
 
     python -m experiments.talker.timing [--minutes 48] [--seed 0]
 
-Three clocks: what the truth says; the syllable's energy peak measured from the audio; the stroke's arrival measured
-from the motion. Arrival is the first moment after a burst of the faster wrist at which it has slowed to 35 % of the
-burst, or speeds up again: the speed at which a minimum-jerk step is where the truth puts the apex. A stroke's burst is
-the last one until 0.06 s after its true apex; arrivals found in the motion alone know nothing of the truth, and include
-those of preparations and retractions.
+Three sources of time: the truth; the syllable's energy peak measured in the audio; the stroke's arrival measured in the
+motion. Arrival is the first moment after a burst of the faster wrist at which it has slowed to 35 % of the burst, or
+speeds up again: the speed at which a minimum-jerk step is where the truth puts the apex. A stroke's burst is the last
+one until 0.06 s after its true apex; arrivals found in the motion alone are independent of the truth and include those
+of preparations and retractions.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def last_burst(speed: np.ndarray) -> int:
 
     Before it lies the preparation, which may be the faster movement.
     """
-    # An end counts as a peak: the stretch may be cut within the movement.
+    # The end counts as a peak: the stretch may be cut within the movement.
     padded = np.pad(speed, 1, constant_values=-1.0)
     peaks = np.flatnonzero((padded[1:-1] > padded[:-2]) & (padded[1:-1] >= padded[2:]))
     return int(peaks[speed[peaks] >= 0.4 * speed.max()][-1])
@@ -74,7 +74,7 @@ def measure(role: dict[str, Any], fps: float = FPS) -> dict[str, list[float]]:
     for stroke in take.annotations["gestures"]["strokes"]:
         planned = syllables[stroke["syllable"]]["peak"]
         near = np.flatnonzero(np.abs(audible_times - planned) <= NEAR)
-        # The hand that moves most is the one that is seen to lead.
+        # The hand that moves most is taken as the leading one.
         begin, end = (round((stroke["apex"] + shift) * fps) for shift in (-0.35, 0.06))
         begin, end = max(begin, 0), max(end, 1)
         hand = int(np.argmax(speed[begin:end].max(axis=0)))
@@ -128,7 +128,7 @@ def against_shifts(recordings: list[dict[str, list[float]]], moves: str, speech:
 
 
 def spread(values: np.ndarray) -> dict[str, Any]:
-    """Mean, deviation and robust versions of what could be measured."""
+    """Mean, standard deviation and robust versions of the available measurements."""
     found = values[np.isfinite(values)]
     return {
         "n": len(found),
@@ -141,8 +141,8 @@ def spread(values: np.ndarray) -> dict[str, Any]:
     }
 
 
-def asked(draws: int, seed: int) -> dict[str, float]:
-    """Mean and deviation of the truncated normal that leads are drawn from."""
+def requested_leads(draws: int, seed: int) -> dict[str, float]:
+    """Mean and standard deviation of the truncated normal distribution from which leads are drawn."""
     values = np.random.default_rng([seed, 42]).normal(LEAD_MEAN, LEAD_SPREAD, draws)
     values = values[(values >= LEAD_RANGE[0]) & (values <= LEAD_RANGE[1])]
     return {
@@ -156,13 +156,13 @@ def asked(draws: int, seed: int) -> dict[str, float]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much is generated, and how often it is shifted."""
+    """Add the amount of talk and the number of shifts."""
     parser.add_argument("--minutes", type=float, default=48.0)
     parser.add_argument("--shifts", type=int, default=200, help="circular shifts of the null")
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Everything about timing."""
+    """All figures of timing."""
     roles = cast_evenly(1, options.minutes * 60 / 48, options.seed, rooms=False)
     recordings = parallel(partial(measure, fps=FPS), roles, options.workers)
     stacked = {name: np.concatenate([rows[name] for rows in recordings]) for name in ("planned_peak", "planned_apex")}
@@ -188,7 +188,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     return {
         "strokes": len(stacked["peak"]),
         "recordings": len(roles),
-        "asked": asked(1_000_000, options.seed),
+        "asked": requested_leads(1_000_000, options.seed),
         "leads": {name: spread(values) for name, values in leads.items()},
         "tolerance": TOLERANCE,
         "shares": shares,
@@ -201,8 +201,8 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def tables(result: dict[str, Any]) -> str:
     """Leads, then shares with their null."""
-    want = result["asked"]
-    rows = [["asked for (truncated normal)", None, None, want["mean"], want["std"], None, None, None]]
+    lead = result["asked"]
+    rows = [["requested (truncated normal)", None, None, lead["mean"], lead["std"], None, None, None]]
     for name, value in result["leads"].items():
         keys = ("n", "missed", "mean", "std", "median", "std_robust", "p5_p95")
         rows.append([name, *(value[key] for key in keys)])
@@ -215,14 +215,14 @@ def tables(result: dict[str, Any]) -> str:
         [f"within {result['tolerance']:g} s", "moves", "share", "shifted: mean", "shifted: 95 % band", "z"],
     )
     return (
-        f"{result['strokes']} strokes of {result['recordings']} recordings, all speakers and emotions. Asked for: a "
-        f"normal of mean {want['normal_mean']:g} s and deviation {want['normal_std']:g} s, cut to {want['from']:g} to "
-        f"{want['to']:g} s.\n\n{first}\n{second}"
+        f"{result['strokes']} strokes of {result['recordings']} recordings, all speakers and emotions. Requested: a "
+        f"normal of mean {lead['normal_mean']:g} s and deviation {lead['normal_std']:g} s, cut to {lead['from']:g} to "
+        f"{lead['to']:g} s.\n\n{first}\n{second}"
     )
 
 
 def picture(result: dict[str, Any], path: Path) -> None:
-    """Histograms of the asked and the measured lead."""
+    """Histograms of the requested and the measured lead."""
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
@@ -235,10 +235,10 @@ def picture(result: dict[str, Any], path: Path) -> None:
     ):
         counts = np.array(result["histogram"][name], float)
         axes.bar(middle, counts / counts.sum() / width, width, alpha=0.5, label=label)
-    want = result["asked"]
-    inside = (middle >= want["from"]) & (middle <= want["to"])
-    density = np.exp(-((middle - want["normal_mean"]) ** 2) / (2 * want["normal_std"] ** 2)) * inside
-    axes.plot(middle, density / density.sum() / width, color="black", lw=1, label="asked for")
+    lead = result["asked"]
+    inside = (middle >= lead["from"]) & (middle <= lead["to"])
+    density = np.exp(-((middle - lead["normal_mean"]) ** 2) / (2 * lead["normal_std"] ** 2)) * inside
+    axes.plot(middle, density / density.sum() / width, color="black", lw=1, label="requested")
     axes.axvline(0, color="grey", lw=0.8)
     axes.set(xlabel="stroke arrives before its syllable's energy peak, seconds", ylabel="density", xlim=(-0.2, 0.35))
     axes.legend(frameon=False)

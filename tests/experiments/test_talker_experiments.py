@@ -151,7 +151,7 @@ def test_timing_tables_and_picture(tmp_path):
     result = common.rounded(_with_roles(timing, roles, options))
     timing.picture(result, tmp_path / "t.png")
     assert (tmp_path / "t.png").stat().st_size > 5000
-    assert "asked for" in timing.tables(result)
+    assert "requested" in timing.tables(result)
 
 
 def _with_roles(module, roles, options):
