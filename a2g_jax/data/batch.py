@@ -103,7 +103,9 @@ def gather_clips(arrays: Arrays, shape: ClipShape, starts: Int[Any, " B"], take:
     return clips
 
 
-def gather(array: Shaped[Array, "N *rest"], starts: Int[Array, " B"], frames: int) -> Shaped[Array, "B T *rest"]:
+def gather(
+    array: Shaped[Array | np.ndarray, "N *rest"], starts: Int[Array | np.ndarray, " B"], frames: int
+) -> Shaped[Array, "B T *rest"]:
     """Clips of an array that lies on the device."""
     return jax.vmap(lambda start: jax.lax.dynamic_slice_in_dim(array, start, frames))(starts)
 

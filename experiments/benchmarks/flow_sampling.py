@@ -161,7 +161,7 @@ def _ours(networks: Any, params: Any) -> Callable[..., Any]:
     import jax
     import numpy as np
 
-    condition = jax.jit(networks.heard)
+    condition = jax.jit(networks.audio_context)
     begin, proceed = jax.jit(networks.start, static_argnums=1), jax.jit(networks.proceed)
 
     def sample(z: Any, audio: Any) -> Any:

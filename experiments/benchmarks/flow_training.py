@@ -70,13 +70,13 @@ def main() -> None:
 def _one(options: argparse.Namespace) -> dict[str, Any]:
     import numpy as np
 
-    from a2g_jax.models.train_config import training_preset
+    from a2g_jax.models.registry import find_model
     from experiments.benchmarks.flow_workload import CASES
 
     name, reverse, contender = options.contender.split(":")
     case = CASES[name]
     config = replace(case.config, reverse_share=1.0 if reverse else 0.0)
-    settings = training_preset("stylized_flow", case.preset)
+    settings = find_model("stylized_flow").training_preset(case.preset)
     clips, rng = options.batch or case.batch, np.random.default_rng(options.seed)
     # Random walks, so that neighbouring frames are similar.
     steps = rng.normal(0, 0.1, (clips, config.clip_frames, case.rows, 3))
@@ -100,13 +100,15 @@ def _ours(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: in
     import jax
 
     from a2g_jax.data.batch import Batch
-    from a2g_jax.models.stylized_flow import build
+    from a2g_jax.models.stylized_flow.model import build
+    from a2g_jax.training.stages import stage_spans
     from a2g_jax.training.state import advance, init_state
 
     model = build(config, case.data)
-    state = init_state(model, replace(settings, seed=seed))
+    span = stage_spans(model, settings)[0]
+    state = init_state(model, (span,), seed)
     batch = Batch(jax.device_put(audio), jax.device_put(pose))
-    step = jax.jit(lambda state, key: advance(model, settings, state, batch, key), donate_argnums=0)
+    step = jax.jit(lambda state, key: advance(span, state, batch, key), donate_argnums=0)
 
     def call() -> dict[str, float]:
         nonlocal state

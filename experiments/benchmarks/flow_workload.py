@@ -9,6 +9,7 @@ import numpy as np
 
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 
@@ -41,7 +42,7 @@ class Case:
         """Data of poses that are z-scores already."""
         zeros = np.zeros((self.rows, 3), np.float32)
         layout = PoseLayout(tuple(f"row {row}" for row in range(self.rows)), ())
-        return Data(layout, self.fps, self.bands, Statistics(zeros, zeros + 1.0), "directions")
+        return Data(PoseSpace(layout, "directions"), self.fps, self.bands, Statistics(zeros, zeros + 1.0))
 
 
 CASES = {

@@ -73,14 +73,20 @@ def _one(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def _ours(config: Any, corpus: Any, options: argparse.Namespace) -> dict[str, Any]:
     import jax
 
+    from a2g_jax.data.batch import clip_shape
     from a2g_jax.data.batches import find_crops
-    from a2g_jax.training.loop import _step_function
+    from a2g_jax.data.on_demand import Part
+    from a2g_jax.training.loop import step_programs
+    from a2g_jax.training.stages import stage_spans
     from a2g_jax.training.state import init_state
 
-    model = config.build()
+    model, settings = config.build(), config.train_config
     crops = find_crops(corpus, "train", options.frames)
-    step = _step_function(model, config.train_config, corpus, crops, config)
-    state = init_state(model, config.train_config)
+    shape = clip_shape(model.batch_fields, options.frames, corpus.fps, corpus.mel.sample_rate)
+    spans = stage_spans(model, settings)
+    part = Part({name: corpus.array(name) for name in shape.arrays}, corpus.segments("train"))
+    step = step_programs(spans[0], shape, crops, config)(part)
+    state = init_state(model, spans, settings.seed)
     parameters = sum(leaf.size for leaf in jax.tree.leaves(state.params))
     last = {}
 

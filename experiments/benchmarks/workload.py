@@ -8,6 +8,7 @@ import numpy as np
 from a2g_jax.data.corpus import Corpus, Entry
 from a2g_jax.data.splits import Segment
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.train_config import TRAIN_PRESETS
@@ -53,8 +54,7 @@ def make_corpus(folder: Path, frames: int, joints: int, seed: int) -> Corpus:
         path=folder,
         fps=FPS,
         mel=mel,
-        body=skeleton,
-        representation="6d",
+        space=PoseSpace(skeleton),
         recordings=(Entry("noise", 0, frames, "none", "", {}),),
         splits={"train": [Segment(0, 0, frames)]},
         recipe={"seed": seed},

@@ -47,7 +47,7 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
         rows = []
         for percentile in PERCENTILES:
             curves = (f"{name}={percentile:g}",)
-            made = replace(run, config=replace(run.config, model_config=replace(config, control_curves=curves)))
+            made = replace(run, config=run.config.with_sampling(controls=curves))
             styles = styles_of(made, corpus, features, samples, seed)
             column = config.style_controls.index(name)
             rows.append(

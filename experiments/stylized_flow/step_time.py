@@ -17,8 +17,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from a2g_jax.data.batch import Batch
-from a2g_jax.data.batches import draw_starts, find_crops, gather
+from a2g_jax.data.batch import Batch, gather
+from a2g_jax.data.batches import draw_starts, find_crops
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.io.files import write_json
 from a2g_jax.training.stages import stage_spans

@@ -5,7 +5,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -208,8 +208,12 @@ def described(
     """Configuration of a variant's run, and a digest of everything that its scores depend on."""
     made = variants.get(variant.trained_as or name, variant)
     steps = round(where.steps * made.steps)
-    preset = find_model(made.model).presets[made.preset]
-    config = replace(preset, **made.changes)
+    entry = find_model(made.model)
+    of_sampling = {field.name for field in fields(entry.sampling)}
+    config = replace(
+        entry.presets[made.preset], **{name: value for name, value in made.changes.items() if name not in of_sampling}
+    )
+    sampling = {name: value for name, value in made.changes.items() if name in of_sampling}
     # Ramps must end before training does.
     ramps = {
         name: min(getattr(config, name), steps // 3)
@@ -226,13 +230,24 @@ def described(
     )
     needs = any(getattr(config, name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
     perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
-    run = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual)
+    run = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual).with_sampling(**sampling)
     return _digest(run, corpus, variant.generation), run
 
 
+#: Settings of generation by their names in the digests of records, which date from version 0.1.
+_OLD_NAMES = {"controls": "control_curves"}
+
+
 def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | None) -> str:
-    about = {"corpus": name_of(corpus), "generation": dict(generation or {}), "package": None}
-    values = {**run_to_json(config, 0), **about}
+    """A digest of everything that scores depend on, the same as in version 0.1, so that its records stay valid."""
+    values = run_to_json(config, 0)
+    sampling = {
+        _OLD_NAMES.get(name, name): value
+        for name, value in values.pop("sampling").items()
+        if name not in ("keep_shared", "keep_specific")
+    }
+    values["model_config"] |= sampling
+    values |= {"corpus": name_of(corpus), "generation": dict(generation or {}), "package": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -259,8 +274,7 @@ def _trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting
     seconds, computing = json.loads(spent.read_text(encoding="utf-8"))
     run = load_run(folder)
     if variant.generation:
-        settings = replace(run.config.model_config, **variant.generation)
-        run = replace(run, config=replace(run.config, model_config=settings))
+        run = replace(run, config=run.config.with_sampling(**variant.generation))
     return run, seconds, computing
 
 

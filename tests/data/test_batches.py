@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from a2g_jax.data.batches import Dressing, draw_starts, find_crops, gather, gather_from_disk, tiled_starts
+from a2g_jax.data.batch import FIELDS, Batch, clip_shape, gather, gather_clips, gather_from_disk
+from a2g_jax.data.batches import BatchMaker, draw_starts, find_crops, tiled_starts
 from a2g_jax.data.corpus import Corpus, Entry
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 
 LENGTHS = (12, 5, 30, 9)
@@ -26,8 +28,7 @@ def corpus(**splits):
         path=Path("corpus"),
         fps=30.0,
         mel=MelConfig(),
-        body=Skeleton(np.zeros((1, 3), np.float32), ("a",), (-1,)),
-        representation="6d",
+        space=PoseSpace(Skeleton(np.zeros((1, 3), np.float32), ("a",), (-1,))),
         recordings=tuple(Entry(f"r{n}", int(firsts[n]), length, "", "", {}) for n, length in enumerate(LENGTHS)),
         splits={name: [Segment(*row) for row in rows] for name, rows in splits.items()},
         recipe={},
@@ -38,8 +39,6 @@ def corpus(**splits):
 TRAIN = [(0, 0, 12), (1, 0, 5), (2, 10, 25), (3, 0, 9)]
 #: Rows of the arrays at which a clip of six frames may start: recordings begin at rows 0, 12, 17 and 47.
 VALID = [*range(0, 7), *range(27, 37), *range(47, 51)]
-
-LABELS = jnp.array([[0, 2], [1, 0], [0, 1]], jnp.int32)
 
 draw = jax.jit(draw_starts, static_argnums=2)
 
@@ -96,28 +95,57 @@ def test_tiles_cover_without_overlap():
     assert tiled_starts(corpus(train=TRAIN), "train", 100).tolist() == []
 
 
-class TestDressing:
+def test_every_field_of_a_batch_has_its_arrays():
+    assert set(FIELDS) == set(Batch._fields)
+
+
+@pytest.mark.parametrize("take", [gather, gather_from_disk])
+def test_clips_have_the_declared_fields(take):
+    """Slices of frames, labels at the first frame, and samples from where a frame's begin."""
+    arrays = {
+        "audio": np.arange(40.0).reshape(20, 2),
+        "pose": np.arange(20.0).reshape(20, 1, 1),
+        "emotion": np.arange(20) // 10,
+        "waveform": np.arange(1000, dtype=np.int16),
+        "waveform_start": np.round(np.arange(20) * 16000 / 320).astype(np.int32),
+    }
+    shape = clip_shape(("emotion", "waveform", "audio"), 4, 320.0, 16000)
+    assert shape.fields == ("audio", "pose", "emotion", "waveform")
+    starts = np.array([0, 9, 16], np.int32)
+    clips = gather_clips(arrays, shape, starts, take)
+    assert set(clips) == set(shape.fields)
+    np.testing.assert_array_equal(clips["pose"][..., 0, 0], starts[:, None] + np.arange(4))
+    np.testing.assert_array_equal(clips["emotion"], [0, 0, 1])
+    np.testing.assert_array_equal(clips["waveform"], 50 * starts[:, None] + np.arange(200))
+    batch = BatchMaker(Statistics(np.zeros(2, np.float32), np.ones(2, np.float32)), 0.0)(None, clips)
+    assert batch.speaker is None
+    np.testing.assert_allclose(batch.waveform[1, :2], np.array([450, 451]) / 32768)
+
+
+def test_unknown_fields_are_refused():
+    with pytest.raises(ValueError, match="got smell"):
+        clip_shape(("audio", "smell"), 4, 30.0, 16000)
+
+
+class TestBatchMaker:
     statistics = Statistics(np.full(8, -30.0, np.float32), np.full(8, 10.0, np.float32))
     audio = jnp.asarray(np.random.default_rng(1).uniform(-60, 0, (3, 7, 8)), jnp.float32)
-    pose = jnp.ones((3, 7, 2, 6))
+    clips = {"audio": audio, "pose": jnp.ones((3, 7, 2, 6)), "emotion": jnp.array([0, 1, 0])}  # noqa: RUF012
 
     def test_without_a_key_it_only_normalises(self):
-        dressed = Dressing(self.statistics, 1.0)(None, self.audio, self.pose, LABELS)
-        np.testing.assert_allclose(dressed.audio, (np.asarray(self.audio) + 30) / 10, rtol=1e-5, atol=1e-5)
-        assert dressed.pose is self.pose
-        assert (dressed.emotion.tolist(), dressed.speaker.tolist()) == ([0, 1, 0], [2, 0, 1])
+        batch = BatchMaker(self.statistics, 1.0)(None, self.clips)
+        np.testing.assert_allclose(batch.audio, (np.asarray(self.audio) + 30) / 10, rtol=1e-5, atol=1e-5)
+        assert batch.pose is self.clips["pose"]
+        assert batch.emotion.tolist() == [0, 1, 0]
 
     def test_without_strength_the_key_does_not_matter(self):
-        dress = Dressing(self.statistics, 0.0)
-        np.testing.assert_array_equal(
-            dress(jax.random.key(0), self.audio, self.pose, LABELS).audio,
-            dress(None, self.audio, self.pose, LABELS).audio,
-        )
+        make = BatchMaker(self.statistics, 0.0)
+        np.testing.assert_array_equal(make(jax.random.key(0), self.clips).audio, make(None, self.clips).audio)
 
     def test_every_clip_is_augmented_differently(self):
-        same = jnp.broadcast_to(self.audio[:1], self.audio.shape)
-        dress = jax.jit(Dressing(self.statistics, 1.0))
-        result = np.asarray(dress(jax.random.key(0), same, self.pose, LABELS).audio)
+        same = {**self.clips, "audio": jnp.broadcast_to(self.audio[:1], self.audio.shape)}
+        make = jax.jit(BatchMaker(self.statistics, 1.0))
+        result = np.asarray(make(jax.random.key(0), same).audio)
         assert np.abs(result[0] - result[1]).max() > 0.01
         assert np.abs(result[1] - result[2]).max() > 0.01
-        np.testing.assert_array_equal(result, dress(jax.random.key(0), same, self.pose, LABELS).audio)
+        np.testing.assert_array_equal(result, make(jax.random.key(0), same).audio)

@@ -9,9 +9,11 @@ from flax.traverse_util import flatten_dict
 from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import speech2gesture
 from a2g_jax.models.base import Data
+from a2g_jax.models.speech2gesture.model import build
 from a2g_jax.training.state import joint_loss
 
 torch = pytest.importorskip("torch")
@@ -56,7 +58,7 @@ def _setting(representation, dtype):
         else PoseLayout(tuple("abcd"), ((0, 1), (0, 2), (1, 3)))
     )
     mean, std = rng.normal(size=(ROWS, width)).astype(dtype), rng.uniform(0.3, 0.6, (ROWS, width)).astype(dtype)
-    model = speech2gesture.build(CONFIG, Data(body, 30.0, BANDS, Statistics(mean, std), representation))
+    model = build(CONFIG, Data(PoseSpace(body, representation), 30.0, BANDS, Statistics(mean, std)))
     shapes = jax.eval_shape(model.init, jax.random.key(0))
     draw = lambda leaf: jnp.asarray(rng.normal(0, 1 / np.sqrt(np.prod(leaf.shape[:-1])), leaf.shape), dtype)  # noqa: E731
     params = jax.tree.map(lambda leaf: draw(leaf) if len(leaf.shape) > 1 else 0.5 + 0.3 * draw(leaf), shapes)

@@ -10,6 +10,7 @@ import pytest
 
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
@@ -23,7 +24,7 @@ weights = pytest.importorskip("experiments.benchmarks.torch_flow_weights")
 CLIPS, BANDS, ROWS = 2, 3, 5
 SMALL = {"flow_steps": 3, "hidden": 8, "history_frames": 3, "lookahead_frames": 2, "clip_frames": 12}
 CONFIGS = {
-    # An odd number of told poses, so that the encoder's halving rounds.
+    # An odd number of poses, so that the encoder's halving rounds.
     "gru, global encoder": StylizedFlowConfig(
         **SMALL, global_channels=4, encoder_channels=6, encoder_blocks=2, embedding_channels=5
     ),
@@ -38,7 +39,7 @@ class Setting:
         self.config, rng = config, np.random.default_rng(3)
         statistics = Statistics(np.zeros((ROWS, 1), np.float32), np.ones((ROWS, 1), np.float32))
         layout = PoseLayout(tuple("abcde"), ())
-        self.networks = FlowNetworks(config, Data(layout, 20.0, BANDS, statistics, "directions"))
+        self.networks = FlowNetworks(config, Data(PoseSpace(layout, "directions"), 20.0, BANDS, statistics))
         self.params = jax.tree_util.tree_map_with_path(partial(_moved, rng), self.networks.init(jax.random.key(5)))
         normal = lambda *size: jnp.asarray(rng.normal(size=size), jnp.float32)  # noqa: E731
         inner = config.clip_frames - config.history_frames - config.lookahead_frames
@@ -68,13 +69,13 @@ def test_latents_log_determinants_and_inverse_agree(setting):
 
     @jax.jit
     def ours(params, flat, audio):
-        told = networks.conditioning(params, audio, flat, setting.seen)
+        given = networks.conditioning(params, audio, flat, setting.mask)
         inner = networks.inner(flat)
-        return inner, *networks.latents(params, inner, told), networks.motion(params, setting.z, told)
+        return inner, *networks.latents(params, inner, given), networks.motion(params, setting.z, given)
 
     inner, z, log_det, motion = ours(setting.params, setting.flat, setting.audio)
     with torch.no_grad():
-        condition = twin.condition(_torch(setting.flat), _torch(setting.audio), _torch(setting.seen))
+        condition = twin.condition(_torch(setting.flat), _torch(setting.audio), _torch(setting.mask))
         their_z, their_log_det = twin.latents(_torch(inner), condition)
         their_motion = twin.motion(_torch(setting.z), condition)
     np.testing.assert_allclose(z, their_z, atol=1e-4)
@@ -89,8 +90,8 @@ def test_sampling_frame_by_frame_agrees(setting, precompute):
 
     @jax.jit
     def ours(params, audio, z):
-        heard = networks.audio_context(params, audio[: z.shape[0]])
-        return networks.proceed(params, z, heard, networks.start(params, CLIPS))[0]
+        given = networks.audio_context(params, audio[: z.shape[0]])
+        return networks.proceed(params, z, given, networks.start(params, CLIPS))[0]
 
     x = ours(setting.params, audio, jnp.swapaxes(z, 0, 1))
     theirs = setting.twin.sample(_torch(z), _torch(audio), precompute)
@@ -101,11 +102,11 @@ def test_losses_and_gradients_agree(setting):
     config, networks = setting.config, setting.networks
 
     def terms(params):
-        told = networks.conditioning(params, setting.audio, setting.flat, setting.seen)
+        given = networks.conditioning(params, setting.audio, setting.flat, setting.mask)
         inner = networks.inner(setting.flat)
-        z, log_det = networks.latents(params, inner, told)
+        z, log_det = networks.latents(params, inner, given)
         bits = -jnp.mean(log_prob(z, config.freedom) + log_det) / math.log(2.0)
-        return jnp.stack([bits, jnp.mean(jnp.abs(networks.motion(params, setting.z, told) - inner))])
+        return jnp.stack([bits, jnp.mean(jnp.abs(networks.motion(params, setting.z, given) - inner))])
 
     @jax.jit
     def ours_with_gradients(params):
@@ -113,7 +114,7 @@ def test_losses_and_gradients_agree(setting):
         return values, jax.lax.map(lambda row: pull(row)[0], jnp.eye(2))
 
     ours, ours_gradients = ours_with_gradients(setting.params)
-    batch = (setting.flat, setting.audio, setting.seen, setting.z)
+    batch = (setting.flat, setting.audio, setting.mask, setting.z)
     theirs = setting.twin.terms(*(_torch(array) for array in batch))
     for number, name in enumerate(("bits", "reconstruction")):
         np.testing.assert_allclose(float(ours[number]), theirs[name].item(), rtol=1e-4, err_msg=name)

@@ -10,13 +10,15 @@ import pytest
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import audio2gestures
 from a2g_jax.models.audio2gestures import objective
 from a2g_jax.models.audio2gestures.codec import Codec
+from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.base import Data
 from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig
-from a2g_jax.models.motion_autoencoder.config import build as build_autoencoder
+from a2g_jax.models.motion_autoencoder.model import build as build_autoencoder
 from a2g_jax.models.motion_autoencoder.model import encode
 from a2g_jax.training.state import joint_loss
 
@@ -56,7 +58,7 @@ def _setting(dtype, config=CONFIG):
     rng = np.random.default_rng(3)
     skeleton = Skeleton(rng.normal(0, 0.2, (JOINTS, 3)).astype(dtype), tuple("abcdef"), PARENTS)
     statistics = Statistics(np.zeros((JOINTS, 6), dtype), np.ones((JOINTS, 6), dtype))
-    data = Data(skeleton, 30.0, BANDS, statistics)
+    data = Data(PoseSpace(skeleton), 30.0, BANDS, statistics)
     features = None
     if config.lpips_weight > 0:
         eyes = jax.tree.map(lambda p: jnp.asarray(p, dtype), build_autoencoder(EYES, data).init(jax.random.key(8)))
@@ -129,7 +131,7 @@ def test_networks_agree():
 
 def _compare(dtype, tolerance, config=CONFIG):
     data, params, batch, key, twin = _setting(dtype, config)
-    model = audio2gestures.build(config, data)
+    model = build(config, data)
     theirs = twin.terms(_torch(batch.audio), _torch(batch.pose), _noise(key, dtype, config))
     weighted = set(objective.weights(config)(jnp.int32(0)))
     names = sorted(weighted & set(jax.eval_shape(joint_loss(model.stages[0]), params, key, batch, jnp.int32(0))[1]))

@@ -10,6 +10,7 @@ from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed
 from a2g_jax.geometry.mirror import mirror
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_to_6d
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow.controls import SCALES, check_controls, measure
@@ -38,7 +39,7 @@ def measured(motion: Motion, representation="6d", names=NAMES):
     write = matrix_to_6d if representation == "6d" else axis_angle_from_matrix
     rows = np.asarray(jax.jit(write)(motion.rotations))
     nothing = Statistics(np.zeros(rows.shape[1:], np.float32), np.ones(rows.shape[1:], np.float32))
-    data = Data(motion.skeleton, motion.fps, 4, nothing, representation)
+    data = Data(PoseSpace(motion.skeleton, representation), motion.fps, 4, nothing)
     return np.asarray(jax.jit(lambda pose: measure(names, data, pose))(rows[None])[0])
 
 
@@ -98,11 +99,11 @@ def test_poses_are_measured_where_their_joints_are(motion, hands):
 
 def test_poses_without_wrists_are_refused(motion):
     nothing = Statistics(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
-    points = Data(PoseLayout(("a", "b"), ((0, 1),)), FPS, 4, nothing, "directions")
+    points = Data(PoseSpace(PoseLayout(("a", "b"), ((0, 1),)), "directions"), FPS, 4, nothing)
     with pytest.raises(InputError, match=r"--style-controls: .* holds directions"):
         check_controls(("height",), points)
     check_controls((), points)
     names = tuple(name.replace("Wrist", "Claw") for name in motion.skeleton.names)
     clawed = type(motion.skeleton)(motion.skeleton.offsets, names, motion.skeleton.parents)
     with pytest.raises(InputError, match="L_Wrist, R_Wrist"):
-        check_controls(("height",), Data(clawed, FPS, 4, nothing))
+        check_controls(("height",), Data(PoseSpace(clawed), FPS, 4, nothing))

@@ -11,9 +11,11 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.model import build
+from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import Run, RunConfig
@@ -52,7 +54,7 @@ def part(motion, first, stop):
 
 @cache
 def clip(pose="6d", frames=90, seed=1):
-    """A generated recording as a corpus would write it down."""
+    """A generated recording as rows of a corpus."""
     take = talk(6.0, seed)
     audio, motion = take.audio[: round(frames / 30 * 16000)], part(take.motion, 0, frames)
     return Clip(represent(motion, pose, "it")[0], log_mel(audio, MEL, 30.0, frames), motion, audio)
@@ -60,7 +62,7 @@ def clip(pose="6d", frames=90, seed=1):
 
 @cache
 def run_of(pose="6d", controls=()):
-    """A flow fitted to two clips, whose couplings do something: untrained, they have zero weights and hear nothing."""
+    """A flow fitted to two clips, whose couplings are not the identity, as they are untrained."""
     clips = [clip(pose, 90, seed) for seed in (1, 2)]
     poses, audio = (np.stack([one[number] for one in clips]) for number in (0, 1))
     statistics = {
@@ -68,10 +70,14 @@ def run_of(pose="6d", controls=()):
         "pose": Statistics(poses.mean((0, 1)), poses.std((0, 1)) + 0.01),
         "root": Statistics(np.array([0.0, 0.9, 0.0], np.float32), np.ones(3, np.float32)),
     }
-    config = replace(MODELS[pose], style_controls=controls, control_curves=("height=10",) if controls else ())
+    config = replace(MODELS[pose], style_controls=controls)
+    sampling = StylizedFlowSampling(controls=("height=10",) if controls else ())
     body = represent(clips[0].motion, pose, "it")[1]
     corpus = {"fingerprint": "toy", "recipe": {}, "seconds": 6.0}
-    about = RunConfig("stylized_flow", "tiny", config, TrainConfig(), 30.0, MEL, body, pose, statistics, corpus)
+    space = PoseSpace(body, pose)
+    about = RunConfig(
+        "stylized_flow", "tiny", config, TrainConfig(), 30.0, MEL, space, statistics, corpus, sampling=sampling
+    )
     model = build(config, about.data())
     batch = Batch(np.asarray(statistics["audio"].normalise(audio), np.float32), poses)
     params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from a2g_jax.cli import main
 from a2g_jax.errors import InputError
-from a2g_jax.generation.engine import LANES, Generator
+from a2g_jax.generation.engine import LANES
+from a2g_jax.generation.generator import Generator
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style, blend, drive, there_and_back
 from a2g_jax.io.audio import write_audio

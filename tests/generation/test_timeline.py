@@ -14,14 +14,13 @@ from a2g_jax.generation.audio2gestures.pin_report import report_pins
 from a2g_jax.generation.audio2gestures.pins import (
     Pin,
     check_pins,
-    face,
     parse_pin,
     pin_codes,
     pin_weights,
     read_pin,
-    same_rest,
 )
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.onto import face, same_rest
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.talker.recordings import talk

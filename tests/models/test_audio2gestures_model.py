@@ -12,12 +12,14 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.models import MODELS, find_model
+from a2g_jax.models import find_model
 from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.audio2gestures.objective import weights as loss_weights
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Condition, Data
 
 CONFIG = replace(
@@ -41,7 +43,7 @@ SKELETON = Skeleton(
     np.random.default_rng(0).normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), tuple("abcde"), (-1, 0, 1, 1, 3)
 )
 DATA = Data(
-    SKELETON,
+    PoseSpace(SKELETON),
     30.0,
     BANDS,
     Statistics(
@@ -232,7 +234,7 @@ AUDIO = np.random.default_rng(8).normal(size=(384, BANDS)).astype(np.float32)
 
 @pytest.mark.parametrize(("redraw_frames", "sample_codes"), [(48, True), (0, False)])
 def test_samples_do_not_depend_on_windows(params, redraw_frames, sample_codes):
-    model = build(replace(CONFIG, redraw_frames=redraw_frames, sample_codes=sample_codes), DATA)
+    model = build(CONFIG, DATA, Audio2GesturesSampling(redraw_frames=redraw_frames, sample_codes=sample_codes))
     assert model.halo == 5  # two frames of the decoder, three of the mapping net
 
     @jax.jit
@@ -285,13 +287,14 @@ def test_dropout_is_on_in_training_alone(params, batch):
     def draws(model, part, *arguments):
         return str(jax.make_jaxpr(part(model))(*arguments)).count("random_bits")
 
-    training = (lambda m: m.loss), params, jax.random.key(0), batch, jnp.int32(5)
+    training = (lambda m: joint_loss(m.stages[0])), params, jax.random.key(0), batch, jnp.int32(5)
     assert draws(model, *training) > draws(MODEL, *training)
     assert draws(model, lambda m: m.reconstruct, params, batch) == 0
 
 
 def test_registry():
-    assert find_model("audio2gestures") is MODELS["audio2gestures"]
+    assert find_model("audio2gestures").config is Audio2GesturesConfig
+    assert find_model("audio2gestures").builder() is build
     with pytest.raises(InputError, match="no model 'gestures'; there are: audio2gestures"):
         find_model("gestures")
     assert build(PRESETS["paper"], DATA).halo == 124

@@ -14,11 +14,13 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.rotation import matrix_to_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.audio2gestures.model import build
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.training.state import joint_loss
 
@@ -26,24 +28,22 @@ BANDS, JOINTS, FRAMES = 5, 4, 32
 RNG = np.random.default_rng(0)
 SKELETON = Skeleton(RNG.normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), tuple("abcd"), (-1, 0, 1, 1))
 DATA = Data(
-    SKELETON,
+    PoseSpace(SKELETON),
     30.0,
     BANDS,
     Statistics(RNG.normal(size=(JOINTS, 6)).astype(np.float32), np.full((JOINTS, 6), 0.5, np.float32)),
 )
 KEYPOINTS = Data(
-    PoseLayout(tuple("abcd"), ((0, 1), (1, 2), (1, 3))),
+    PoseSpace(PoseLayout(tuple("abcd"), ((0, 1), (1, 2), (1, 3))), "keypoints"),
     15.0,
     BANDS,
     Statistics(RNG.normal(size=(JOINTS, 2)).astype(np.float32), np.full((JOINTS, 2), 3.0, np.float32)),
-    "keypoints",
 )
 EXPONENTIAL = Data(
-    SKELETON,
+    PoseSpace(SKELETON, "exponential"),
     20.0,
     BANDS,
     Statistics(RNG.normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), np.full((JOINTS, 3), 0.5, np.float32)),
-    "exponential",
 )
 OTHER_POSES = {"keypoints": KEYPOINTS, "exponential": EXPONENTIAL}
 BASE = replace(
@@ -57,7 +57,6 @@ BASE = replace(
     dct_points=FRAMES,
     kl_ramp_steps=0,
     alignment_ramp_steps=0,
-    sample_codes=True,
 )
 VARIANTS = {
     "gru": {"backbone": "gru", "recurrent_layers": 2, "recurrent_channels": 3},
@@ -163,7 +162,9 @@ def test_the_shared_code_of_the_dct_space_is_certain_and_the_specific_one_has_a_
 
 def test_edits_are_made_in_generation_alone():
     plain = build(replace(BASE, latent="dct"), DATA)
-    edited = build(replace(BASE, latent="dct", edits=("specific keep 0", "shared sample 0:32 3")), DATA)
+    edited = build(
+        replace(BASE, latent="dct"), DATA, Audio2GesturesSampling(edits=("specific keep 0", "shared sample 0:32 3"))
+    )
     params = params_of(plain)
     summary = {"specific_mean": jnp.ones((1, 3)), "specific_std": jnp.ones((1, 3))}
     audio = batch(DATA, 128).audio[0]
@@ -206,18 +207,34 @@ def test_gradients_of_structured_and_perceptual_losses(x64):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"lpips_weight": 1.0}, "train one with 'a2g train motion_autoencoder'"),
         ({"stft_weight": 1.0, "clip_frames": 16}, "clips of 32 frames or more"),
         ({"backbone": "rnn"}, "expected one of tcn, gru, transformer"),
         ({"latent": "dct", "clip_frames": 40}, "multiple of --dct-points 32"),
         ({"latent": "dct", "split": False}, "no DCT variant"),
         ({"latent": "dct", "dct_points": 24, "clip_frames": 24}, "divisor of 128"),
         ({"attention_window": 7}, "an even number"),
-        ({"edits": ("shared swap 0:3",)}, "only Python can give"),
-        ({"edits": ("shared blur",)}, "for example"),
         ({"recurrent_layers": 0}, "--recurrent-layers: expected 1 or more"),
     ],
 )
 def test_refused(changes, message):
     with pytest.raises(InputError, match=message):
         build(replace(BASE, **changes), DATA)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"edits": ("shared swap 0:3",)}, "only Python can give"),
+        ({"edits": ("shared blur",)}, "for example"),
+        ({"keep_shared": 33}, "there are 32 bands"),
+        ({"noise_frames": 0}, "--noise-frames: expected 1 or more"),
+    ],
+)
+def test_refused_in_generation(changes, message):
+    with pytest.raises(InputError, match=message):
+        build(BASE, DATA, Audio2GesturesSampling(**changes))
+
+
+def test_perceptual_losses_need_a_feature_network():
+    assert build(replace(BASE, lpips_weight=1.0), DATA).needs_perceptual
+    assert not build(BASE, DATA).needs_perceptual

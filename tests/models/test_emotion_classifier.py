@@ -10,6 +10,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Data
 from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
 from a2g_jax.models.emotion_classifier.model import build, classify
@@ -17,7 +18,7 @@ from a2g_jax.training.state import joint_loss
 
 LAYOUT = PoseLayout(("a", "b"), ((0, 1),))
 STATISTICS = Statistics(np.zeros((2, 2), np.float32), np.ones((2, 2), np.float32))
-DATA = Data(LAYOUT, 15.0, 3, STATISTICS, "keypoints", ("anger", "neutral", "sadness"))
+DATA = Data(PoseSpace(LAYOUT, "keypoints"), 15.0, 3, STATISTICS, ("anger", "neutral", "sadness"))
 
 
 def batch(seed, clips=24):
@@ -49,7 +50,7 @@ def test_it_learns_emotions_from_its_input_alone(looks_at):
     held = batch(10_000, clips=60)
     right = lambda seen: float(
         model.stages[0].validation_loss(params, jax.random.key(0), seen, jnp.int32(0))[1]["accuracy"]
-    )  # noqa: E731
+    )
     assert right(held) > 0.9
     other = "audio" if looks_at == "motion" else "pose"
     assert right(held._replace(**{other: jnp.zeros_like(getattr(held, other))})) == right(held)

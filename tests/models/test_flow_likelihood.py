@@ -11,6 +11,7 @@ from scipy import stats
 from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Data
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.model import build
@@ -37,11 +38,10 @@ SMALL = StylizedFlowConfig(
 MOGLOW = replace(SMALL, cell="lstm", layers=2, freedom=0.0, global_channels=0)
 SHAPE = (2, 2)
 DATA = Data(
-    PoseLayout(("a", "b", "c"), ((0, 1), (1, 2))),
+    PoseSpace(PoseLayout(("a", "b", "c"), ((0, 1), (1, 2))), "keypoints"),
     15.0,
     3,
     Statistics(np.full(SHAPE, 0.5, np.float32), np.full(SHAPE, 2.0, np.float32)),
-    "keypoints",
 )
 
 
@@ -72,7 +72,7 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
     first, stop = config.history_frames, 8 - config.lookahead_frames
 
     def latents(inner):
-        """Of the whole clip: a pose changes what all frames after it are told, too."""
+        """Of the whole clip: a pose changes what all frames after it are given, too."""
         clip = flat.at[:, first:stop].set(inner.reshape(1, stop - first, 4))
         return networks.latents(params, networks.inner(clip), networks.conditioning(params, batch.audio, clip))[
             0
@@ -122,9 +122,9 @@ def test_sixteen_steps_invert_after_training():
 
     def back_and_forth(params, audio, pose):
         flat = networks.flat(pose)
-        told = networks.conditioning(params, audio, flat)
-        z, _ = networks.latents(params, networks.inner(flat), told)
-        return networks.inner(flat), networks.motion(params, z, told)
+        given = networks.conditioning(params, audio, flat)
+        z, _ = networks.latents(params, networks.inner(flat), given)
+        return networks.inner(flat), networks.motion(params, z, given)
 
     single = as_single(batch_of(4, 24, 9))
     x, back = jax.jit(back_and_forth)(state.params, single.audio, single.pose)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.data.batch import Batch
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.base import Data
 from a2g_jax.models.motion_autoencoder.config import PRESETS, MotionAutoencoderConfig
@@ -24,7 +25,9 @@ def data_of(representation):
     """Unit statistics of a small body."""
     shape = {"6d": (3, 6), "exponential": (3, 3), "directions": (2, 3), "keypoints": (3, 2)}[representation]
     body = CHAIN if representation in ("6d", "exponential") else LAYOUT
-    return Data(body, 30.0, 4, Statistics(np.zeros(shape, np.float32), np.ones(shape, np.float32)), representation)
+    return Data(
+        PoseSpace(body, representation), 30.0, 4, Statistics(np.zeros(shape, np.float32), np.ones(shape, np.float32))
+    )
 
 
 def batch_of(representation, frames=16, clips=2, seed=0):

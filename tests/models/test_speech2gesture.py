@@ -12,7 +12,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS
+from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import find_model
@@ -45,7 +45,7 @@ def make_data(representation="6d"):
     if representation in ("keypoints", "directions"):
         bones = tuple((0, end) for end in range(1, ROWS + (representation == "directions")))
         body = PoseLayout(tuple("abcde"[: len(bones) + 1]), bones)
-    return Data(body, 30.0, BANDS, statistics, representation)
+    return Data(PoseSpace(body, representation), 30.0, BANDS, statistics)
 
 
 def make_batch(representation="6d", clips=2, frames=16, dtype=np.float32):
@@ -255,7 +255,7 @@ def test_halo_is_how_far_an_output_sees(depth):
 def test_the_papers_networks():
     """Eight layers of audio encoder and sixteen of U-Net, and a halo that one block of context covers."""
     config = PRESETS["paper"]
-    data = Data(make_data().body, 30.0, 64, make_data().pose_statistics)
+    data = Data(PoseSpace(make_data().body), 30.0, 64, make_data().pose_statistics)
     shapes = jax.eval_shape(build(config, data).init, jax.random.key(0))["generator"]
     layers = lambda tree: sum(1 for name in tree if "Conv" in name)  # noqa: E731
     assert layers(shapes["AudioEncoder_0"]) == 8

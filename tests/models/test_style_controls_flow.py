@@ -11,14 +11,17 @@ from a2g_jax.cli import main
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.models import MODELS
+from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.control_curves import parse_curves, percentiles
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
-from a2g_jax.models.stylized_flow.controls import asked, measure, parse_curves, scaled
+from a2g_jax.models.stylized_flow.controls import measure, requested, scaled
 from a2g_jax.models.stylized_flow.model import build
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
-from a2g_jax.models.train_config import TrainConfig, training_preset
+from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
+from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state
 
@@ -41,7 +44,9 @@ BODY = Skeleton(
     ("Pelvis", "L_Shoulder", "R_Shoulder", "L_Wrist", "R_Wrist"),
     (-1, 0, 0, 1, 2),
 )
-DATA = Data(BODY, 20.0, 4, Statistics(np.zeros((5, 3), np.float32), np.full((5, 3), 0.5, np.float32)), "exponential")
+DATA = Data(
+    PoseSpace(BODY, "exponential"), 20.0, 4, Statistics(np.zeros((5, 3), np.float32), np.full((5, 3), 0.5, np.float32))
+)
 SETTINGS = TrainConfig(steps=60, learning_rate=1e-2, clip_value=5.0, clip_norm=100.0)
 
 
@@ -72,14 +77,16 @@ heights_of = jax.jit(lambda pose: measure(("height",), DATA, pose))
 
 def generated(trained, *curves, frames=128):
     """Heights of the hands at every frame of a motion."""
-    model = build(replace(CONFIG, control_curves=curves), DATA)
+    model = build(CONFIG, DATA, StylizedFlowSampling(controls=curves))
     params, summary = trained
-    heard = jax.jit(model.condition)(params, {}, Condition(batch_of(clips=1, frames=frames, seed=5).audio[0]))
-    pose = jax.jit(model.sample)(params, summary, jax.random.key(1), heard, jnp.int32(0))
+    wanted = percentiles(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
+    given = Condition(batch_of(clips=1, frames=frames, seed=5).audio[0], controls=jnp.asarray(wanted))
+    condition = jax.jit(model.condition)(params, summary, given)
+    pose = jax.jit(model.sample)(params, summary, jax.random.key(1), condition, jnp.int32(0))
     return np.asarray(heights_of(pose[None])[0, :, 0])
 
 
-def test_what_is_asked_for_is_what_the_hands_do(trained):
+def test_hands_follow_the_requested_controls(trained):
     low, high = generated(trained, "height=10").mean(), generated(trained, "height=90").mean()
     wanted = np.percentile(trained[1]["control_mean"], [10, 90])
     assert high - low > 0.5 * (wanted[1] - wanted[0])
@@ -88,24 +95,24 @@ def test_what_is_asked_for_is_what_the_hands_do(trained):
     assert risen[-1] - risen[0] > 0.5 * (high - low)
 
 
-def test_controls_are_told_of_the_frame_itself_and_never_hidden():
+def test_controls_are_those_of_the_frame_itself_and_never_masked():
     networks = FlowNetworks(replace(CONFIG, style_controls=("height", "speed")), DATA)
     batch = batch_of(clips=2)
-    hidden = jnp.zeros((2, 17, 2), bool)
-    tell = jax.jit(networks.told)
-    told = tell({}, batch.audio, networks.flat(batch.pose), hidden)
+    mask = jnp.zeros((2, 17, 2), bool)
+    conditioning = jax.jit(networks.conditioning)
+    own = conditioning({}, batch.audio, networks.flat(batch.pose), mask)
     controls = jax.jit(lambda pose: scaled(("height", "speed"), measure(("height", "speed"), DATA, pose)))(batch.pose)
-    assert told.known.shape == (2, 17, 4 * 4 + 2)
-    np.testing.assert_allclose(told.known[..., -2:], controls[:, 2:19], atol=1e-4)
-    assert not told.history.any()
+    assert own.context.shape == (2, 17, 4 * 4 + 2)
+    np.testing.assert_allclose(own.context[..., -2:], controls[:, 2:19], atol=1e-4)
+    assert not own.history.any()
     # Those that are given are taken instead, each frame its own; 0.1 m counts as 1.
     rising = jnp.broadcast_to(jnp.arange(20.0)[None, :, None], (2, 20, 2))
-    given = tell({}, batch.audio, networks.flat(batch.pose), hidden, rising)
-    np.testing.assert_allclose(given.known[..., -2:], 10.0 * rising[:, 2:19], rtol=1e-6)
+    given = conditioning({}, batch.audio, networks.flat(batch.pose), mask, rising)
+    np.testing.assert_allclose(given.context[..., -2:], 10.0 * rising[:, 2:19], rtol=1e-6)
 
 
 def test_the_share_of_controls_is_that_of_training(trained):
-    """Controls added to what was heard give the motion of latents that training would."""
+    """Controls added to the audio's share give the motion of latents that training would."""
     networks, params = FlowNetworks(CONFIG, DATA), trained[0]
     batch = batch_of(clips=1, frames=64, seed=3)
     z = jax.random.normal(jax.random.key(2), (64, 15))
@@ -113,8 +120,8 @@ def test_the_share_of_controls_is_that_of_training(trained):
 
     @jax.jit
     def one_by_one(params):
-        heard = networks.steered(params, networks.audio_context(params, batch.audio[0]), controls)
-        return networks.proceed(params, z[:, None], heard, networks.start(params, 1))[0][:, 0]
+        given = networks.audio_context(params, batch.audio[0], controls)
+        return networks.proceed(params, z[:, None], given, networks.start(params, 1))[0][:, 0]
 
     @jax.jit
     def at_once(params, before):
@@ -126,11 +133,12 @@ def test_the_share_of_controls_is_that_of_training(trained):
     np.testing.assert_allclose(at_once(params, made), made, atol=1e-4)
 
 
-def test_what_is_asked_for_is_the_same_in_any_window():
+def test_requested_values_are_the_same_in_any_window():
     curves = parse_curves(("speed=0@1 100@3", "height=25"), ("height", "speed"))
     training = jnp.stack([jnp.linspace(0.0, 0.4, 5), jnp.linspace(1.0, 2.0, 5)], axis=-1)
-    whole = asked(curves, training, jnp.int32(0), 256, 32.0)
-    parts = [asked(curves, training, jnp.int32(start), 128, 32.0) for start in (0, 128)]
+    values = lambda start, frames: requested(jnp.asarray(percentiles(curves, start, frames, 32.0)), training)  # noqa: E731
+    whole = values(0, 256)
+    parts = [values(start, 128) for start in (0, 128)]
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-6)
     np.testing.assert_allclose(whole[:, 0], np.full(256, 0.1), atol=1e-6)
     np.testing.assert_allclose(whole[[0, 32, 64, 96, 255], 1], [1.0, 1.0, 1.5, 2.0, 2.0], atol=1e-6)
@@ -141,33 +149,37 @@ def test_what_is_asked_for_is_the_same_in_any_window():
     [
         ({"style_controls": ("width",)}, "--style-controls.*'width'"),
         ({"style_controls": ("height", "height")}, "each once"),
-        ({"control_curves": ("speed=50",)}, "style controls are: height"),
-        ({"control_curves": ("height=101",)}, "from 0 to 100"),
-        ({"control_curves": ("height=-1",)}, "from 0 to 100"),
-        ({"control_curves": ("height=nan",)}, "'nan' is no number"),
-        ({"control_curves": ("height",)}, "NAME=PERCENTILE"),
-        ({"control_curves": ("height=",)}, "NAME=PERCENTILE"),
-        ({"control_curves": ("height=10@0 90",)}, "NAME=PERCENTILE"),
-        ({"control_curves": ("height=10@2 90@1",)}, "seconds that rise"),
-        ({"control_curves": ("height=10", "height=20")}, "twice"),
+        ({"controls": ("speed=50",)}, "controls are: height"),
+        ({"controls": ("height=101",)}, "from 0 to 100"),
+        ({"controls": ("height=-1",)}, "from 0 to 100"),
+        ({"controls": ("height=nan",)}, "'nan' is no number"),
+        ({"controls": ("height",)}, "NAME=PERCENTILE"),
+        ({"controls": ("height=",)}, "NAME=PERCENTILE"),
+        ({"controls": ("height=10@0 90",)}, "NAME=PERCENTILE"),
+        ({"controls": ("height=10@2 90@1",)}, "seconds that rise"),
+        ({"controls": ("height=10", "height=20")}, "twice"),
     ],
 )
 def test_wrong_controls_are_named(changes, named):
     with pytest.raises(InputError, match=named):
+        if "controls" in changes:
+            build(CONFIG, DATA, StylizedFlowSampling(**changes))
         replace(CONFIG, **changes)
 
 
 def test_every_preset_of_every_model_can_be_trained_and_moglow_as_published(capsys):
-    for name, entry in MODELS.items():
+    for name in MODELS:
+        entry = find_model(name)
         for preset in entry.presets:
-            assert training_preset(name, preset).steps > 0
+            assert entry.training_preset(preset).steps > 0
+    flow = find_model("stylized_flow")
     for preset in ("moglow", "moglow_styled"):
-        training = training_preset("stylized_flow", preset)
+        training = flow.training_preset(preset)
         assert (training.batch_size, training.steps, training.learning_rate) == (80, 80_000, 1.5e-3)
         assert (training.schedule, training.warmup_steps) == ("noam", 3_000)
         assert (training.clip_value, training.clip_norm) == (5.0, 100.0)
-    assert training_preset("stylized_flow", "ted").batch_size == 200
-    assert training_preset("stylized_flow", "paper").steps == 30_000
+    assert flow.training_preset("ted").batch_size == 200
+    assert flow.training_preset("paper").steps == 30_000
     assert PRESETS["moglow_styled"] == replace(PRESETS["moglow"], style_controls=("height", "speed", "radius"))
     assert main(["train", "stylized_flow", "--preset", "moglow", "--settings"]) == 0
     shown = capsys.readouterr().out

@@ -11,6 +11,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.model import build, draw_latents
@@ -36,11 +37,10 @@ LINEAR = replace(SMALL, predictor=True, global_channels=0, reverse_share=0.0)
 MOGLOW = replace(SMALL, cell="lstm", freedom=0.0, global_channels=0, reverse_share=0.0)
 SHAPE = (2, 3)
 DATA = Data(
-    PoseLayout(("a", "b", "c"), ((0, 1), (1, 2))),
+    PoseSpace(PoseLayout(("a", "b", "c"), ((0, 1), (1, 2))), "directions"),
     15.0,
     4,
     Statistics(np.full(SHAPE, 0.5, np.float32), np.full(SHAPE, 2.0, np.float32)),
-    "directions",
 )
 SETTINGS = TrainConfig(steps=200, learning_rate=3e-3, clip_value=5.0, clip_norm=100.0)
 
@@ -72,15 +72,15 @@ def test_trained_a_little_its_latents_are_those_that_were_drawn(config):
     networks = FlowNetworks(config, DATA)
     audio = batch_of(clips=1, frames=128).audio[0]
     key = jax.random.key(7)
-    heard = jax.jit(model.condition)(state.params, {}, Condition(audio))
-    pose = jax.jit(model.sample)(state.params, {}, key, heard, jnp.int32(0))
+    given = jax.jit(model.condition)(state.params, {}, Condition(audio))
+    pose = jax.jit(model.sample)(state.params, {}, key, given, jnp.int32(0))
     assert pose.shape == (128, *SHAPE)
     # Sampled frame by frame; encoded all at once, with the same poses before and the same silence around.
     before, after = config.history_frames, config.lookahead_frames
     flat = jnp.pad(networks.flat(pose[None]), ((0, 0), (before, after), (0, 0)))
     around = jnp.pad(audio, ((before, after), (0, 0)))[None]
-    told = jax.jit(networks.told)(state.params, around, flat)
-    z, _ = jax.jit(networks.latents)(state.params, networks.inner(flat), told)
+    given = jax.jit(networks.conditioning)(state.params, around, flat)
+    z, _ = jax.jit(networks.latents)(state.params, networks.inner(flat), given)
     drawn = draw_latents(config, key, jnp.int32(0), 128, networks.channels)
     np.testing.assert_allclose(z[0], drawn, atol=5e-3)
 
@@ -89,12 +89,12 @@ def test_a_motion_in_two_parts_is_the_motion_in_one():
     model = build(SMALL, DATA)
     params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=256).audio[0]
-    heard = jax.jit(model.condition)(params, {}, Condition(audio))
-    whole = jax.jit(model.sample)(params, {}, key, heard, jnp.int32(0))
-    carried, parts = jax.jit(model.begin)(params, {}, key), []
+    given = jax.jit(model.condition)(params, {}, Condition(audio))
+    whole = jax.jit(model.sample)(params, {}, key, given, jnp.int32(0))
+    state_before, parts = jax.jit(model.begin)(params, {}, key), []
     proceed = jax.jit(model.proceed)
     for start in (0, 128):
-        part = jax.tree.map(lambda array, first=start: array[first : first + 128], heard)
+        part = jax.tree.map(lambda array, first=start: array[first : first + 128], given)
         pose, carried = proceed(params, {}, key, part, jnp.int32(start), carried)
         parts.append(pose)
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)
@@ -104,12 +104,12 @@ def test_poses_beyond_those_of_training_are_drawn_back_and_no_others_are():
     model = build(MOGLOW, DATA)
     params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=128).audio[0]
-    heard, sample = jax.jit(model.condition)(params, {}, Condition(audio)), jax.jit(model.sample)
-    free = sample(params, {}, key, heard, jnp.int32(0))
+    given, sample = jax.jit(model.condition)(params, {}, Condition(audio)), jax.jit(model.sample)
+    free = sample(params, {}, key, given, jnp.int32(0))
 
     def within(low, high):
         bounds = {"pose_low": jnp.full((2, 6), low), "pose_high": jnp.full((2, 6), high)}
-        return FlowNetworks(MOGLOW, DATA).flat(sample(params, bounds, key, heard, jnp.int32(0))[None])[0]
+        return FlowNetworks(MOGLOW, DATA).flat(sample(params, bounds, key, given, jnp.int32(0))[None])[0]
 
     flat = FlowNetworks(MOGLOW, DATA).flat(free[None])[0]
     np.testing.assert_array_equal(within(-1e3, 1e3), flat)
@@ -140,16 +140,16 @@ def test_the_first_step_fits_the_actnorms_and_no_other_does():
         np.testing.assert_allclose(ours, theirs, atol=1e-5)
 
 
-def test_told_poses_are_those_before_and_audio_those_around():
+def test_conditioning_poses_are_those_before_and_audio_those_around():
     config = replace(SMALL, global_channels=0)
     networks = FlowNetworks(config, DATA)
     audio, flat = jnp.arange(24.0)[None, :, None] * jnp.ones((1, 1, 4)), jnp.arange(24.0)[None, :, None]
-    told = networks.conditioning({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
-    assert told.history.shape == (1, 19, 18)
-    np.testing.assert_array_equal(told.history[0, 0].reshape(3, 6)[:, 0], [0, 1, 2])
-    np.testing.assert_array_equal(told.known[0, 0].reshape(6, 4)[:, 0], [0, 1, 2, 3, 4, 5])
+    given = networks.conditioning({}, audio, jnp.broadcast_to(flat, (1, 24, 6)))
+    assert given.history.shape == (1, 19, 18)
+    np.testing.assert_array_equal(given.history[0, 0].reshape(3, 6)[:, 0], [0, 1, 2])
+    np.testing.assert_array_equal(given.context[0, 0].reshape(6, 4)[:, 0], [0, 1, 2, 3, 4, 5])
     np.testing.assert_array_equal(networks.inner(flat)[0, :, 0], np.arange(3, 22))
-    np.testing.assert_array_equal(told.history[0, -1].reshape(3, 6)[:, 0], [18, 19, 20])
+    np.testing.assert_array_equal(given.history[0, -1].reshape(3, 6)[:, 0], [18, 19, 20])
 
 
 def test_loss_has_the_terms_of_the_reverse_pass_only_where_it_is_taken():
@@ -181,6 +181,6 @@ def test_wrong_settings_are_named(changes, named):
         replace(SMALL, **changes)
 
 
-def test_the_perceptual_loss_asks_for_its_network():
-    with pytest.raises(InputError, match="--features"):
-        build(PRESETS["paper"], DATA)
+def test_the_perceptual_loss_needs_its_network():
+    assert build(PRESETS["paper"], DATA).needs_perceptual
+    assert not build(PRESETS["moglow"], DATA).needs_perceptual

@@ -17,6 +17,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.audio import write_audio
 from a2g_jax.models.registry import find_model, find_trained_model
 from a2g_jax.training.run import load_run
@@ -158,7 +159,7 @@ def test_the_gan_clips_each_player_alone(toy_corpus):
     from a2g_jax.training.state import advance, init_state
 
     entry = find_model(MODEL)
-    data = Data(toy_corpus.space, 30.0, toy_corpus.mel.width, toy_corpus.statistics["pose"], ("a", "b"))
+    data = Data(PoseSpace(toy_corpus.space, ("a", "b")), 30.0, toy_corpus.mel.width, toy_corpus.statistics["pose"])
     model = entry.builder()(entry.presets["tiny"], data, entry.sampling())
     first, second = model.stages[0].updates
 

@@ -64,7 +64,9 @@ def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SA
         del key, step
         made, terms, weights = regression(params, batch)
         if adversarial:
-            terms["adversarial"] = jnp.mean(jnp.square(score(params["discriminator"], motion(made)) - 1.0))
+            terms["adversarial"] = jnp.mean(
+                jnp.square(score(jax.lax.stop_gradient(params["discriminator"]), motion(made)) - 1.0)
+            )
             weights["adversarial"] = config.adversarial_weight
         # XLA keeps a product with a constant zero, and the whole gradient behind it: leave those terms out.
         total = sum((weights[name] * terms[name] for name in terms if weights[name] > 0), start=jnp.zeros(()))
@@ -76,7 +78,7 @@ def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SA
         """The discriminator's side: 1 for true motion, 0 for generated."""
         del key, step
         made, _, _ = regression(params, batch)
-        both = jnp.concatenate([motion(batch.pose), motion(made)])
+        both = jnp.concatenate([motion(batch.pose), motion(jax.lax.stop_gradient(made))])
         real_score, fake_score = jnp.split(score(params["discriminator"], both), 2)
         loss = jnp.mean(jnp.square(real_score - 1.0)) + jnp.mean(jnp.square(fake_score))
         return loss, {"discriminator": loss}
