@@ -1,6 +1,5 @@
 """Generation: exact lengths, seeds, windows, and roots that stand."""
 
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -21,6 +21,7 @@ from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.audio2gestures.objective import weights as loss_weights
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Condition, Data
+from a2g_jax.training.state import joint_loss
 
 CONFIG = replace(
     PRESETS["tiny"],
@@ -76,7 +77,7 @@ def make_params(dtype=np.float32, model=MODEL):
 @pytest.fixture(scope="module")
 def loss():
     """The loss compiled once; a second trace fails the test that causes it."""
-    return jax.jit(chex.assert_max_traces(MODEL.loss, n=1))
+    return jax.jit(chex.assert_max_traces(joint_loss(MODEL.stages[0]), n=1))
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +152,7 @@ def double():
         batch, params = make_batch(np.float64), make_params(np.float64)
 
     def mixed(params, weights):
-        total, terms = MODEL.loss(params, jax.random.key(0), batch, jnp.int32(7))
+        total, terms = joint_loss(MODEL.stages[0])(params, jax.random.key(0), batch, jnp.int32(7))
         return sum(weights[name] * terms[name] for name in TERMS) + weights["total"] * total
 
     return jax.jit(jax.value_and_grad(mixed)), params
@@ -293,7 +294,7 @@ def test_dropout_is_on_in_training_alone(params, batch):
 
 
 def test_registry():
-    assert find_model("audio2gestures").config is Audio2GesturesConfig
+    assert find_model("audio2gestures").config is type(PRESETS["paper"])
     assert find_model("audio2gestures").builder() is build
     with pytest.raises(InputError, match="no model 'gestures'; there are: audio2gestures"):
         find_model("gestures")

@@ -48,9 +48,10 @@ def test_it_learns_emotions_from_its_input_alone(looks_at):
     for number in range(120):
         params, state = step(params, state, batch(number), jax.random.key(number))
     held = batch(10_000, clips=60)
-    right = lambda seen: float(
-        model.stages[0].validation_loss(params, jax.random.key(0), seen, jnp.int32(0))[1]["accuracy"]
-    )
+
+    def right(clips):
+        return float(model.stages[0].validation_loss(params, jax.random.key(0), clips, jnp.int32(0))[1]["accuracy"])
+
     assert right(held) > 0.9
     other = "audio" if looks_at == "motion" else "pose"
     assert right(held._replace(**{other: jnp.zeros_like(getattr(held, other))})) == right(held)

@@ -161,10 +161,13 @@ def test_requested_values_are_the_same_in_any_window():
     ],
 )
 def test_wrong_controls_are_named(changes, named):
-    with pytest.raises(InputError, match=named):
+    def make():
         if "controls" in changes:
-            build(CONFIG, DATA, StylizedFlowSampling(**changes))
-        replace(CONFIG, **changes)
+            return build(CONFIG, DATA, StylizedFlowSampling(**changes))
+        return replace(CONFIG, **changes)
+
+    with pytest.raises(InputError, match=named):
+        make()
 
 
 def test_every_preset_of_every_model_can_be_trained_and_moglow_as_published(capsys):

@@ -13,12 +13,13 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.optimiser import learning_rate
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.model import build, draw_latents
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans
-from a2g_jax.training.state import advance, init_state, learning_rate
+from a2g_jax.training.state import advance, init_state
 
 SMALL = StylizedFlowConfig(
     flow_steps=3,
@@ -91,11 +92,11 @@ def test_a_motion_in_two_parts_is_the_motion_in_one():
     key, audio = jax.random.key(3), batch_of(clips=1, frames=256).audio[0]
     given = jax.jit(model.condition)(params, {}, Condition(audio))
     whole = jax.jit(model.sample)(params, {}, key, given, jnp.int32(0))
-    state_before, parts = jax.jit(model.begin)(params, {}, key), []
+    state, parts = jax.jit(model.begin)(params, {}, key), []
     proceed = jax.jit(model.proceed)
     for start in (0, 128):
         part = jax.tree.map(lambda array, first=start: array[first : first + 128], given)
-        pose, carried = proceed(params, {}, key, part, jnp.int32(start), carried)
+        pose, state = proceed(params, {}, key, part, jnp.int32(start), state)
         parts.append(pose)
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-5)
 
