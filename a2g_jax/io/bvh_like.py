@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.euler import continuous_euler, euler_matrices
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.bvh_hierarchy import Joint, parse_hierarchy
-from a2g_jax.io.bvh_reader import euler_matrices
-from a2g_jax.io.euler import continuous_euler
 from a2g_jax.io.files import atomic_path
 
 _MOTION = re.compile(r"^[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.euler import euler_matrices
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh_hierarchy import MAX_VALUE, Joint, fail, parse_hierarchy, parse_number, shown
@@ -194,17 +195,3 @@ def _extent(joints: list[Joint], offsets: Float[np.ndarray, "J 3"]) -> float:
     tips = [places[index] + end for index, joint in enumerate(joints) for end in joint.ends]
     points = np.concatenate([places, np.reshape(tips, (-1, 3))])
     return float(np.max(points.max(axis=0) - points.min(axis=0)))
-
-
-def euler_matrices(degrees: Float[np.ndarray, "*batch A"], order: str) -> Float[np.ndarray, "*batch 3 3"]:
-    """Rotation matrices of one to three intrinsic Euler angles: ``"ZXY"`` is ``Rz @ Rx @ Ry``."""
-    angles = np.radians(degrees)
-    cosines, sines = np.cos(angles)[..., None], np.sin(angles)[..., None]
-    matrices = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3)).copy()
-    for at, axis in enumerate(order):
-        # Multiplying by a rotation about one axis from the right mixes the two columns of the others.
-        i, j = ("XYZ".index(axis) + 1) % 3, ("XYZ".index(axis) + 2) % 3
-        cosine, sine = cosines[..., at, :], sines[..., at, :]
-        left, right = matrices[..., i], matrices[..., j]
-        matrices[..., i], matrices[..., j] = left * cosine + right * sine, right * cosine - left * sine
-    return matrices

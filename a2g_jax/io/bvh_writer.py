@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.euler import continuous_euler
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS
-from a2g_jax.io.euler import continuous_euler
 from a2g_jax.io.files import atomic_path
 
 #: Length in metres of the End Site of a leaf joint that has none.

@@ -1,18 +1,39 @@
-"""Euler angles that run on smoothly over time."""
+"""Intrinsic Euler angles in degrees, in the order in which they are named: ``"ZXY"`` is ``R = Rz @ Rx @ Ry``."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 #: Below this cosine of the middle angle the first angle is lost in the rounding of float32 rotations.
 _LOCK = 1e-6
 
 
-def continuous_euler(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.ndarray, "T J 3"]:
-    """Intrinsic Euler angles in degrees whose every frame lies as near as can be to the one before.
+def euler_matrices(degrees: Float[np.ndarray, "*batch A"], order: str) -> Float[np.ndarray, "*batch 3 3"]:
+    """Rotation matrices of Euler angles.
 
-    ``order`` is a permutation of ``XYZ``; ``"ZXY"`` gives angles with ``R = Rz @ Rx @ Ry``. Every rotation has two
-    triples, ``(a, b, c)`` and ``(a + 180, 180 - b, c + 180)``, each up to whole turns. Frame 0 takes the triple whose
-    middle angle is within 90 degrees, every later frame the one nearest to its predecessor's.
+    Args:
+        degrees: one angle for each letter of ``order``.
+        order: any number of the letters ``XYZ``.
+    """
+    angles = np.radians(degrees)
+    cosines, sines = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    matrices = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3)).copy()
+    for at, axis in enumerate(order):
+        # Multiplying by a rotation about one axis from the right mixes the two columns of the others.
+        i, j = ("XYZ".index(axis) + 1) % 3, ("XYZ".index(axis) + 2) % 3
+        cosine, sine = cosines[..., at, :], sines[..., at, :]
+        left, right = matrices[..., i], matrices[..., j]
+        matrices[..., i], matrices[..., j] = left * cosine + right * sine, right * cosine - left * sine
+    return matrices
+
+
+def continuous_euler(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.ndarray, "T J 3"]:
+    """Euler angles without jumps: in each frame the angles nearest to those of the frame before.
+
+    Every rotation has two triples, ``(a, b, c)`` and ``(a + 180, 180 - b, c + 180)``, each up to whole turns. Frame 0
+    takes the triple whose middle angle is within 90 degrees, every later frame the one nearest to its predecessor's.
+
+    Args:
+        order: a permutation of ``XYZ``.
     """
     first = _triples(np.asarray(rotations, np.float64), order)
     second = np.stack([first[..., 0] + 180, 180 - first[..., 1], first[..., 2] + 180], axis=-1)
@@ -44,10 +65,10 @@ def _triples(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.nd
     return np.degrees(np.stack([first, middle, last], axis=-1))
 
 
-def _hold(angles: Float[np.ndarray, "T J"], known) -> Float[np.ndarray, "T J"]:
-    # Where an angle is unknown, that of the last frame that knows it; before the first such frame, the first known.
+def _hold(angles: Float[np.ndarray, "T J"], defined: Bool[np.ndarray, "T J"]) -> Float[np.ndarray, "T J"]:
+    # An undefined angle takes the value of the last frame that defines it, or of the first one that does.
     frames = np.arange(len(angles))[:, None]
-    source = np.maximum.accumulate(np.where(known, frames, -1), axis=0)
-    source = np.where(source < 0, np.argmax(known, axis=0)[None], source)
+    source = np.maximum.accumulate(np.where(defined, frames, -1), axis=0)
+    source = np.where(source < 0, np.argmax(defined, axis=0)[None], source)
     held = np.take_along_axis(angles, source, axis=0)
-    return np.where(known.any(axis=0)[None], held, 0.0)
+    return np.where(defined.any(axis=0)[None], held, 0.0)
