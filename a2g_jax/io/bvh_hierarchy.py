@@ -32,6 +32,17 @@ class Joint:
     ends: list[tuple[float, float, float]] = field(default_factory=list)
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Layout of a BVH file: what a writer needs to write another motion in the same way."""
+
+    head: str
+    """The text before ``MOTION``."""
+    joints: list[Joint]
+    scale: float
+    """Metres in one unit of the file."""
+
+
 def fail(path: object, line: int, message: str) -> NoReturn:
     """Raise the error of one line of a file."""
     raise InputError(f"{path}, line {line}: {message}")

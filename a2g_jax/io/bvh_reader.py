@@ -16,7 +16,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.euler import euler_matrices
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh_hierarchy import MAX_VALUE, Joint, fail, parse_hierarchy, parse_number, shown
+from a2g_jax.io.bvh_hierarchy import MAX_VALUE, Joint, Layout, fail, parse_hierarchy, parse_number, shown
 from a2g_jax.io.files import check_readable
 from a2g_jax.io.frame_rate import rate_from_frame_time
 
@@ -50,6 +50,11 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     Raises:
         InputError: the file is no BVH file or is damaged; the message names the line.
     """
+    return read_with_layout(path, scale=scale)[0]
+
+
+def read_with_layout(path: str | os.PathLike[str], *, scale: float | None = None) -> tuple[Motion, Layout]:
+    """A motion and the layout of its file; arguments and errors of :func:`read_bvh`."""
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise ValueError(f"Expected a positive scale, in metres a unit; got {scale}.")
     path = check_readable(path, "a BVH file")
@@ -66,7 +71,8 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     text = text.replace("\r\n", "\n").replace("\r", "\n")
 
     start = re.search(r"^[ \t]*MOTION[ \t]*$", text, re.IGNORECASE | re.MULTILINE)
-    joints = parse_hierarchy(path, text[: start.start()] if start else text[:4_000_000])
+    head = text[: start.start()] if start else text[:4_000_000]
+    joints = parse_hierarchy(path, head)
     if start is None:
         fail(path, text.count("\n") + 1, "the file ends without a MOTION section; is it cut short?")
     line = text.count("\n", 0, start.start()) + 1
@@ -75,7 +81,13 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     if channels == 0:
         fail(path, joints[0].line, "no joint has a channel, so nothing moves; add CHANNELS.")
     values = _motion_values(path, lines, first, frames, channels)
-    return _motion(joints, values, rate_from_frame_time(frame_time), scale)
+    offsets, rotations, root = _poses(joints, values)
+    if scale is None:
+        scale = 0.01 if _extent(joints, offsets) > _LARGEST_BODY else 1.0
+    skeleton = _skeleton(joints, offsets, scale)
+    fps = rate_from_frame_time(frame_time)
+    motion = Motion(rotations=rotations, root=(root * scale).astype(np.float32), skeleton=skeleton, fps=fps)
+    return motion, Layout(head, joints, scale)
 
 
 def _motion_header(path: object, lines: list[str], line: int) -> tuple[int, str, list[str], int]:
@@ -148,7 +160,10 @@ def _find_fault(path: object, lines: list[str], first: int, channels: int) -> No
     raise InputError(f"{path}: the frames cannot be read as numbers; is the file damaged?")
 
 
-def _motion(joints: list[Joint], values: Float[np.ndarray, "T C"], fps: float, scale: float | None) -> Motion:
+def _poses(
+    joints: list[Joint], values: Float[np.ndarray, "T C"]
+) -> tuple[Float[np.ndarray, "J 3"], Float[np.ndarray, "T J 3 3"], Float[np.ndarray, "T 3"]]:
+    """Offsets, rotations and root path, in the unit of the file."""
     offsets = np.array([joint.offset for joint in joints], np.float64)
     root = np.tile(offsets[0], (len(values), 1))
     angles: dict[str, list[tuple[int, list[int]]]] = {}
@@ -172,19 +187,19 @@ def _motion(joints: list[Joint], values: Float[np.ndarray, "T C"], fps: float, s
     for order, members in angles.items():
         indices = [index for index, _ in members]
         rotations[:, indices] = euler_matrices(values[:, [columns for _, columns in members]], order)
+    return offsets, rotations, root
 
-    if scale is None:
-        scale = 0.01 if _extent(joints, offsets) > _LARGEST_BODY else 1.0
+
+def _skeleton(joints: list[Joint], offsets: Float[np.ndarray, "J 3"], scale: float) -> Skeleton:
     ends = tuple(
         (index, (x * scale, y * scale, z * scale)) for index, joint in enumerate(joints) for x, y, z in joint.ends
     )
-    skeleton = Skeleton(
+    return Skeleton(
         offsets=(offsets * scale).astype(np.float32),
         names=tuple(joint.name for joint in joints),
         parents=tuple(joint.parent for joint in joints),
         ends=ends,
     )
-    return Motion(rotations=rotations, root=(root * scale).astype(np.float32), skeleton=skeleton, fps=fps)
 
 
 def _extent(joints: list[Joint], offsets: Float[np.ndarray, "J 3"]) -> float:

@@ -1,21 +1,27 @@
-"""Write BVH files that Blender, MotionBuilder and the usual viewers open."""
+"""Write BVH files that Blender, MotionBuilder and the usual viewers open, in an own layout or in that of another file."""
 
 import math
 import os
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.euler import continuous_euler
+from a2g_jax.geometry.euler import continuous_euler, euler_matrices
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS
+from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, Layout
 from a2g_jax.io.files import atomic_path
 
 #: Length in metres of the End Site of a leaf joint that has none.
 _TIP = 0.05
+#: Decimals of an angle in degrees.
+_ANGLE_DECIMALS = 6
+#: Degrees by which rotation channels may miss a rotation without a word.
+_CLOSE = 0.1
 
 
 def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY", scale: float = 100.0) -> None:
@@ -40,29 +46,79 @@ def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY
         raise ValueError(f"Expected the rotation order as a permutation of XYZ; got {order!r}.")
     if not (math.isfinite(scale) and scale > 0):
         raise ValueError(f"Expected a positive scale, in units a metre; got {scale}.")
+    rotations, root = _checked(path, motion)
     skeleton = motion.skeleton
-    rotations = np.asarray(motion.rotations, np.float64)
-    root = np.asarray(motion.root, np.float64)
-    _check(path, motion, rotations, root)
-
     walk = _depth_first(skeleton)
-    places = max(6, 8 - math.floor(math.log10(scale)))
+    decimals = max(6, 8 - math.floor(math.log10(scale)))
     angles = continuous_euler(rotations[:, walk], order)
     values = np.concatenate([root * scale, angles.reshape(len(angles), -1)], axis=1)
-    # Rounding here, and adding zero, keeps "-0.000000" out of the file.
-    values[:, :3] = np.round(values[:, :3], places) + 0.0
-    values[:, 3:] = np.round(values[:, 3:], 6) + 0.0
-    row = " ".join([f"%.{places}f"] * 3 + ["%.6f"] * (values.shape[1] - 3)) + "\n"
+    head = "\n".join(_hierarchy(skeleton, walk, order, scale, decimals))
+    _write(path, head, values, [decimals] * 3 + [_ANGLE_DECIMALS] * (values.shape[1] - 3), motion.fps)
+
+
+def write_like(path: str | os.PathLike[str], motion: Motion, layout: Layout) -> dict[str, float]:
+    """Write a motion in the layout of the file that its skeleton was read from: names, channels, orders and unit.
+
+    Angles run on as in :func:`write_bvh`. A joint with fewer than three rotation channels is written as closely as
+    they allow.
+
+    Args:
+        path: written atomically; missing folders are made.
+        layout: of a file with the joints of the motion, as :func:`~a2g_jax.io.bvh.read_with_layout` gives it.
+
+    Returns:
+        Largest error in degrees by joint, of the joints whose channels miss a rotation by more than 0.1 degrees.
+
+    Raises:
+        InputError: the motion has no frames or holds NaN or infinities, or the file cannot be written.
+    """
+    rotations, root = _checked(path, motion)
+    offsets = np.asarray(motion.skeleton.offsets, np.float64) / layout.scale
+    root = root / layout.scale
+    columns: list[Float[np.ndarray, " T"]] = []
+    errors: dict[str, float] = {}
+    for index, joint in enumerate(layout.joints):
+        channels = joint.channels or ()
+        order = "".join(channel[0] for channel in channels if channel.endswith("rotation"))
+        angles, error = _angles(rotations[:, index], order)
+        if error > _CLOSE:
+            errors[joint.name] = error
+        for channel in channels:
+            axis = "XYZ".index(channel[0])
+            if channel.endswith("rotation"):
+                columns.append(angles[:, order.index(channel[0])])
+            else:
+                columns.append(root[:, axis] if index == 0 else np.full(motion.frames, offsets[index, axis]))
+    _write(path, layout.head.rstrip(), np.stack(columns, axis=1), [_ANGLE_DECIMALS] * len(columns), motion.fps)
+    return errors
+
+
+def _angles(rotations: Float[np.ndarray, "T 3 3"], order: str) -> tuple[Float[np.ndarray, "T A"], float]:
+    """Angles in degrees for up to three rotation channels, and by how many degrees they miss the rotations."""
+    whole = order + "".join(axis for axis in "XYZ" if axis not in order)
+    angles = continuous_euler(rotations[:, None], whole)[:, 0, : len(order)]
+    written = euler_matrices(angles, order) if order else np.broadcast_to(np.eye(3), rotations.shape)
+    return angles, float(rotation_angle(written, rotations).max(initial=0.0))
+
+
+def _write(
+    path: str | os.PathLike[str], head: str, values: Float[np.ndarray, "T C"], decimals: Sequence[int], fps: float
+) -> None:
+    """Write the text before ``MOTION`` and the frames, a number of decimals for each column."""
+    places = np.array(decimals)
+    for count in np.unique(places).tolist():
+        # Rounding here, and adding zero, keeps "-0.000000" out of the file.
+        values[:, places == count] = np.round(values[:, places == count], count) + 0.0
+    row = " ".join(f"%.{count}f" for count in decimals) + "\n"
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write("\n".join(_hierarchy(skeleton, walk, order, scale, places)) + "\n")
-        file.write(f"MOTION\nFrames: {motion.frames}\nFrame Time: {1 / motion.fps:.10f}\n")
+        file.write(f"{head}\nMOTION\nFrames: {len(values)}\nFrame Time: {1 / fps:.10f}\n")
         file.writelines(row % tuple(frame) for frame in values.tolist())
 
 
-def _check(
-    path: object, motion: Motion, rotations: Float[np.ndarray, "T J 3 3"], root: Float[np.ndarray, "T 3"]
-) -> None:
+def _checked(path: object, motion: Motion) -> tuple[Float[np.ndarray, "T J 3 3"], Float[np.ndarray, "T 3"]]:
+    """Rotations and root in double precision, or ``InputError`` for a motion that cannot be written."""
     skeleton = motion.skeleton
+    rotations, root = np.asarray(motion.rotations, np.float64), np.asarray(motion.root, np.float64)
     if motion.frames == 0:
         raise InputError(f"{path}: not written: the motion has no frames.")
     if rotations.shape[1] != skeleton.joints or len(root) != len(rotations):
@@ -79,6 +135,7 @@ def _check(
         if len(bad):
             place = "joint" if what == "offsets" else "frame"
             raise InputError(f"{path}: not written: NaN or infinity in the {what} of {place} {bad[0][0]}.")
+    return rotations, root
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
