@@ -1,4 +1,4 @@
-"""Write BVH files that Blender, MotionBuilder and the usual viewers open, in an own layout or in that of another file."""
+"""Write BVH files that Blender, MotionBuilder and the usual viewers open."""
 
 import math
 import os
