@@ -71,4 +71,4 @@ def _hold(angles: Float[np.ndarray, "T J"], defined: Bool[np.ndarray, "T J"]) ->
     source = np.maximum.accumulate(np.where(defined, frames, -1), axis=0)
     source = np.where(source < 0, np.argmax(defined, axis=0)[None], source)
     held = np.take_along_axis(angles, source, axis=0)
-    return np.where(defined.any(axis=0)[None], held, 0.0)
+    return np.where(defined.any(axis=0, keepdims=True), held, 0.0)

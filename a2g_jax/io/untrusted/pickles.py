@@ -1,11 +1,11 @@
-"""Pickles read as data: an own interpreter of the opcodes that can only build plain values.
+"""Pickles read as data, by an interpreter of the opcodes that can only build plain values.
 
 ``pickle.Unpickler`` with an allow-list in ``find_class`` would be less code, but what is allowed is then still called
 with whatever arguments the file gives, ``BUILD`` still runs ``__setstate__``, and the C code still allocates what
 the file says (one ``LONG_BINPUT`` of 2**31 asks for gigabytes). Here no opcode calls anything of the file's choice:
 ``REDUCE`` picks a function of this package by the name of the global, and that function checks its arguments.
 
-The opcodes are those of Python's ``pickletools`` (protocols 0 to 5).
+The opcodes and their arguments are read with the tables of Python's ``pickletools`` (protocols 0 to 5).
 """
 
 import os
