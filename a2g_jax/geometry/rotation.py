@@ -108,21 +108,6 @@ def quaternion_from_matrix(matrix: Float[Array, "3 3"]) -> Float[Array, " 4"]:
     return jnp.where(row[0] < 0, -row, row)
 
 
-@_vectorize(signature="(4),(4)->(4)")
-def quaternion_multiply(left: Float[Array, " 4"], right: Float[Array, " 4"]) -> Float[Array, " 4"]:
-    """Hamilton product: the rotation ``right`` followed by ``left``."""
-    a, b, c, d = left
-    e, f, g, h = right
-    return jnp.array(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )
-
-
 @_vectorize(signature="(3)->(4)")
 def quaternion_from_axis_angle(vector: Float[Array, " 3"]) -> Float[Array, " 4"]:
     """Exponential map from axis times angle (radians) to a unit quaternion."""
