@@ -7,17 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import path_up
-from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.parts import assign_sides, find_parts, trunk_chains
 from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_places, world_rotations
 from a2g_jax.geometry.retarget.rest import anatomy, body_frame, oddness, snapped, trunk_axis
-from a2g_jax.geometry.retarget.topology import joints_by_shape
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: Parts without which there is nothing to retarget.
-_NEEDED = tuple(f"{side}_{part}" for side in "LR" for part in ("Shoulder", "Elbow", "Wrist"))
-_LIMBS = (("Shoulder", "Elbow", "Wrist", "Collar"), ("Hip", "Knee", "Ankle", "Foot"))
 #: A pose of this oddness or less (degrees) is a T-, A- or I-pose; a zero pose, meant to be one, may be a bit worse.
 _GOOD_POSE, _ZERO_POSE, _WORST_POSE = 15.0, 40.0, 75.0
 _AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -94,17 +89,17 @@ def find_rig(
     """
     skeleton = source if isinstance(source, Skeleton) else source.skeleton
     motion = None if isinstance(source, Skeleton) else source
-    roles, untold = _find_roles(skeleton, name, joints or {})
-    by_shape = untold is not None
+    roles, unsided = find_parts(skeleton, name, joints or {})
+    by_shape = unsided is not None
     local, notes = _reference_pose(skeleton, motion, roles, rest, name)
     world = world_rotations(local, skeleton.parents)
     places = joint_places(world, np.asarray(skeleton.offsets, np.float64), skeleton.parents)
-    if untold:
-        roles = _tell_sides(roles, untold, places, name)
+    if unsided:
+        roles = assign_sides(roles, unsided, places, name)
     body = body_frame(places, roles)
     body = _upright(body, drawn="zero pose" in notes[0])
     axes = _world_axes(motion, roles, body, up, name)
-    spine, neck = _trunk(skeleton, roles)
+    spine, neck = trunk_chains(skeleton, roles)
     heights = places @ body[:, 1]
     height = float(heights.max() - heights.min())
     if "L_Ankle" not in roles or "R_Ankle" not in roles:
@@ -114,119 +109,6 @@ def find_rig(
     notes += (f"{height:.2f} tall: lengths are {'right in metres' if factor == 1 else f'{unit}, times {factor}'}",)
     align = anatomy(skeleton, places, world, body, roles)
     return Rig(skeleton, roles, spine, neck, by_shape, local, align, axes, height, notes)
-
-
-def _find_roles(
-    skeleton: Skeleton, name: str, given: Mapping[str, str]
-) -> tuple[dict[str, int], list[tuple[str, ...]] | None]:
-    """Joints by part, and the limbs (from topology) whose sides are still to be told apart; None: all by name."""
-    fixed = {}
-    for role, joint in given.items():
-        if joint not in skeleton.names:
-            raise InputError(f"{name}: has no joint {joint!r} for {role}; it has {', '.join(skeleton.names)}.")
-        fixed[role] = skeleton.index(joint)
-    taken = set(fixed.values())
-    roles = {role: joint for role, joint in named_joints(skeleton.names).items() if joint not in taken} | fixed
-    untold = None
-    if missing := [role for role in _NEEDED if role not in roles]:
-        shape = joints_by_shape(skeleton)
-        if shape is None:
-            raise InputError(
-                f"{name}: no {', no '.join(missing)} found, neither by names nor by the shape of the tree; name the "
-                f"joints in the usual way or give them by hand. It has {', '.join(skeleton.names[:30])}"
-                f"{' ...' if skeleton.joints > 30 else ''}."
-            )
-        roles, untold = _with_names(shape, roles)
-    _complete(skeleton, roles)
-    for side in "LR":
-        _check_chain(skeleton, roles, [f"{side}_Shoulder", f"{side}_Elbow", f"{side}_Wrist"], name)
-        legs = [role for part in ("Hip", "Knee", "Ankle", "Foot") if (role := f"{side}_{part}") in roles]
-        _check_chain(skeleton, roles, legs, name)
-    return roles, untold
-
-
-def _with_names(shape: dict[str, int], named: dict[str, int]) -> tuple[dict[str, int], list[tuple[str, ...]]]:
-    """Parts by topology, corrected by the names there are, and the limbs whose sides no name tells."""
-    untold: list[tuple[str, ...]] = []
-    for parts in _LIMBS:
-        votes = 0
-        for side, other in ("LR", "RL"):
-            for part in parts:
-                joint = named.get(f"{side}_{part}")
-                votes += (joint is not None) * (shape.get(f"{side}_{part}") == joint)
-                votes -= (joint is not None) * (shape.get(f"{other}_{part}") == joint)
-        if votes < 0:
-            shape = _swapped(shape, parts)
-        if votes == 0 and f"L_{parts[0]}" in shape:
-            untold.append(parts)
-    return shape | named, untold
-
-
-def _swapped(roles: dict[str, int], parts: tuple[str, ...]) -> dict[str, int]:
-    """Left and right of a limb exchanged."""
-    swap = {"L": "R", "R": "L"}
-    changed = {f"{swap[s]}_{part}": roles[f"{s}_{part}"] for s in "LR" for part in parts if f"{s}_{part}" in roles}
-    return {role: joint for role, joint in roles.items() if role[2:] not in parts} | changed
-
-
-def _complete(skeleton: Skeleton, roles: dict[str, int]) -> None:
-    """Parts that follow from others: the chest, the pelvis, collars without a usual name."""
-    parents = skeleton.parents
-    roles["Chest"] = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
-    if "L_Hip" in roles and "R_Hip" in roles:
-        fork = _common(parents, roles["L_Hip"], roles["R_Hip"])
-        low = _common(parents, fork, roles["Chest"])
-        pelvis = roles.get("Pelvis")
-        if pelvis is None or any(path_up(parents, roles[part], pelvis) is None for part in ("Chest", "L_Hip", "R_Hip")):
-            roles["Pelvis"] = low
-    elif "Pelvis" in roles and path_up(parents, roles["Chest"], roles["Pelvis"]) is None:
-        del roles["Pelvis"]
-    for side in "LR":
-        above = path_up(parents, roles[f"{side}_Shoulder"], roles["Chest"]) or []
-        if roles.get(f"{side}_Collar") not in above:
-            roles.pop(f"{side}_Collar", None)
-            if above:
-                roles[f"{side}_Collar"] = above[-1]
-    for role in ("Neck", "Head"):
-        if role in roles and path_up(parents, roles[role], roles["Chest"]) is None:
-            # A neck below the fork of the arms is the chest by another name.
-            del roles[role]
-
-
-def _check_chain(skeleton: Skeleton, roles: dict[str, int], chain: list[str], name: str) -> None:
-    for upper, lower in zip(chain, chain[1:], strict=False):
-        if path_up(skeleton.parents, roles[lower], roles[upper]) is None:
-            names = skeleton.names[roles[lower]], skeleton.names[roles[upper]]
-            raise InputError(
-                f"{name}: {lower} ({names[0]}) does not hang below {upper} ({names[1]}); give both by hand."
-            )
-
-
-def _trunk(skeleton: Skeleton, roles: dict[str, int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    parents, chest = skeleton.parents, roles["Chest"]
-    if "Pelvis" not in roles:
-        spine = [chest]
-        while parents[spine[-1]] >= 0:
-            spine.append(parents[spine[-1]])
-    elif roles["Pelvis"] == chest:
-        spine = []
-    else:
-        spine = [chest, *(path_up(parents, chest, roles["Pelvis"]) or [])]
-    neck = []
-    if "Head" in roles:
-        neck = path_up(parents, roles["Head"], chest) or []
-    elif "Neck" in roles:
-        neck = [roles["Neck"]]
-        for joint, parent in enumerate(parents):
-            if parent == neck[0] and parse_name(skeleton.names[joint]).base.startswith("neck"):
-                neck.insert(0, joint)
-    if neck and "Neck" in roles and roles["Neck"] in neck:
-        # What lies between the fork of the arms and the neck by name is spine.
-        cut = neck.index(roles["Neck"]) + 1
-        neck, spine = neck[:cut], [*neck[cut:], *spine]
-    elif neck:
-        roles["Neck"] = neck[-1]
-    return tuple(reversed(spine)), tuple(reversed(neck))
 
 
 def _reference_pose(
@@ -280,21 +162,6 @@ def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "
     return np.stack([frame[:, 1], frame[:, 0], np.cross(frame[:, 1], frame[:, 0])], axis=1)
 
 
-def _tell_sides(
-    roles: dict[str, int], untold: list[tuple[str, ...]], places: Float[np.ndarray, "J 3"], name: str
-) -> dict[str, int]:
-    """Toes point forward; left is then up times forward."""
-    feet = [s for s in "LR" if f"{s}_Foot" in roles and f"{s}_Ankle" in roles]
-    if not feet:
-        raise InputError(f"{name}: names tell nothing and there are no toes to tell left from right; give the joints.")
-    forward = sum((places[roles[f"{s}_Foot"]] - places[roles[f"{s}_Ankle"]] for s in feet), np.zeros(3))
-    left = np.cross(trunk_axis(places, roles), forward)
-    for parts in untold:
-        if left @ (places[roles[f"L_{parts[0]}"]] - places[roles[f"R_{parts[0]}"]]) < 0:
-            roles = _swapped(roles, parts)
-    return roles
-
-
 def _world_axes(
     motion: Motion | None, roles: dict[str, int], body: Float[np.ndarray, "3 3"], up: str | None, name: str
 ) -> Float[np.ndarray, "3 3"]:
@@ -339,13 +206,3 @@ def _guess_unit(height: float) -> tuple[str, float]:
 def _axis_name(vector: Float[np.ndarray, "3"]) -> str:
     axis = int(np.argmax(np.abs(vector)))
     return f"{'+' if vector[axis] > 0 else '-'}{'XYZ'[axis]}"
-
-
-def _common(parents: tuple[int, ...], first: int, second: int) -> int:
-    """The lowest joint that both hang from; one may hang from the other."""
-    while first != second:
-        if first > second:
-            first = parents[first]
-        else:
-            second = parents[second]
-    return first
