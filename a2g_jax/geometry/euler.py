@@ -1,9 +1,9 @@
-"""Intrinsic Euler angles in degrees, in the order in which they are named: ``"ZXY"`` is ``R = Rz @ Rx @ Ry``."""
+"""Intrinsic Euler angles in degrees, in the order of their letters: ``"ZXY"`` is ``R = Rz @ Rx @ Ry``."""
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-#: Below this cosine of the middle angle the first angle is lost in the rounding of float32 rotations.
+#: Below this cosine of the middle angle the rounding of float32 rotations leaves the first angle undefined.
 _LOCK = 1e-6
 
 
@@ -57,7 +57,7 @@ def _triples(rotations: Float[np.ndarray, "T J 3 3"], order: str) -> Float[np.nd
     first = _hold(first, width > _LOCK)
     middle = np.arctan2(sign * rotations[..., i, k], width)
     # The last angle from Ri(a)^T R = Rj(b) Rk(c), whose row j is (sign sin c, cos c) in columns i, j. That stays
-    # accurate near gimbal lock, where it makes up for whatever the first angle is.
+    # accurate near gimbal lock, where it compensates for any first angle.
     cosine, sine = np.cos(first), sign * np.sin(first)
     row_i = cosine * rotations[..., j, i] + sine * rotations[..., k, i]
     row_j = cosine * rotations[..., j, j] + sine * rotations[..., k, j]

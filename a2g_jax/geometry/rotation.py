@@ -34,9 +34,9 @@ def safe_norm(vector: Float[Array, " n"]) -> Float[Array, ""]:
 
 @_vectorize(signature="(6)->(3,3)")
 def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
-    """Gram-Schmidt of the two 3-vectors in ``six``: always a rotation, also for zero, parallel or overflowing vectors.
+    """Rotation matrix by Gram-Schmidt of the two 3-vectors in ``six``, also of zero, parallel or overflowing vectors.
 
-    Degenerate input falls back to a fixed axis, with zero gradient through the part that carries no information.
+    Degenerate input falls back to a fixed axis, with zero gradient through the part without information.
     Written in components because XLA fuses those into one loop; with dot products and stacks of 3-vectors the
     gradient takes three times as long.
     """
@@ -71,7 +71,7 @@ def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
 
 @_vectorize(signature="(3,3)->(6)")
 def matrix_to_6d(matrix: Float[Array, "3 3"]) -> Float[Array, " 6"]:
-    """The first two columns, one after the other."""
+    """The first two columns of the matrix, one after the other."""
     return matrix[:, :2].T.reshape(6)
 
 

@@ -1,4 +1,4 @@
-"""The joints of a rig that stand for the parts of a body: by name, or else by the shape of the tree."""
+"""Joints of a rig by body part: from their names, or else from the shape of the tree."""
 
 from collections.abc import Mapping
 
@@ -76,14 +76,14 @@ def _with_names(shape: dict[str, int], named: dict[str, int]) -> tuple[dict[str,
 
 
 def _swapped(roles: dict[str, int], parts: tuple[str, ...]) -> dict[str, int]:
-    """Left and right of a limb exchanged."""
+    """The roles with left and right of a limb exchanged."""
     swap = {"L": "R", "R": "L"}
     changed = {f"{swap[s]}_{part}": roles[f"{s}_{part}"] for s in "LR" for part in parts if f"{s}_{part}" in roles}
     return {role: joint for role, joint in roles.items() if role[2:] not in parts} | changed
 
 
 def _complete(skeleton: Skeleton, roles: dict[str, int]) -> None:
-    """Parts that follow from others: the chest, the pelvis, collars without a usual name."""
+    """Add parts that follow from others: the chest, the pelvis, collars without a usual name."""
     parents = skeleton.parents
     roles["Chest"] = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
     if "L_Hip" in roles and "R_Hip" in roles:
@@ -138,7 +138,7 @@ def trunk_chains(skeleton: Skeleton, roles: dict[str, int]) -> tuple[tuple[int, 
             if parent == neck[0] and parse_name(skeleton.names[joint]).base.startswith("neck"):
                 neck.insert(0, joint)
     if neck and "Neck" in roles and roles["Neck"] in neck:
-        # What lies between the fork of the arms and the neck by name is spine.
+        # Joints between the fork of the arms and the joint named neck are spine.
         cut = neck.index(roles["Neck"]) + 1
         neck, spine = neck[:cut], [*neck[cut:], *spine]
     elif neck:
@@ -170,7 +170,7 @@ def assign_sides(
 
 
 def _common(parents: tuple[int, ...], first: int, second: int) -> int:
-    """The lowest joint that both hang from; one may hang from the other."""
+    """Lowest common ancestor of two joints, which may be one of them."""
     while first != second:
         if first > second:
             first = parents[first]

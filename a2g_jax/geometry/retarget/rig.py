@@ -1,4 +1,4 @@
-"""What retargeting knows about a rig: its joints' parts in the body, reference pose, axes and unit."""
+"""Rigs analysed for retargeting: body parts, reference pose, axes and unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_place
 from a2g_jax.geometry.retarget.rest import anatomy, body_frame, oddness, snapped, trunk_axis
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: A pose of this oddness or less (degrees) is a T-, A- or I-pose; a zero pose, meant to be one, may be a bit worse.
+#: Largest oddness (degrees) of a T-, A- or I-pose, of a zero pose, and of any other reference pose.
 _GOOD_POSE, _ZERO_POSE, _WORST_POSE = 15.0, 40.0, 75.0
 _AXES = {"X": 0, "Y": 1, "Z": 2}
-#: Metres in a unit, and the factor that mends lengths read in metres or centimetres when the file meant it.
+#: Units, and the factor that corrects lengths that were read as metres or centimetres.
 _UNITS = (("metres", 1.0), ("inches", 2.54), ("millimetres", 0.1), ("feet", 0.3048), ("decimetres", 10.0))
 _ADULT = (1.2, 2.3)
 #: An adult's height over the length of the arm without the hand (Drillis and Contini 1966: 0.186 + 0.146 of height).
@@ -25,26 +25,26 @@ _ARMS_IN_HEIGHT = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A skeleton understood as a person; see :mod:`a2g_jax.geometry.retarget.rest` for the frames."""
+    """A skeleton with the parts of a body; :mod:`a2g_jax.geometry.retarget.rest` defines the frames."""
 
     skeleton: Skeleton
     roles: dict[str, int]
     """Joint of each part: ``Pelvis``, ``L_Hip`` ... ``R_Wrist``, ``Neck``, ``Head``, ``Chest``, ``L_Index1`` ..."""
     spine: tuple[int, ...]
-    """Joints above the pelvis up to the chest, which carries the collars."""
+    """Joints above the pelvis up to the chest, the parent of the collars."""
     neck: tuple[int, ...]
     """Joints between chest and head."""
     by_shape: bool
-    """Whether the parts were found by topology and not by names."""
+    """Whether parts were found by topology instead of names."""
     rest: Float[np.ndarray, "J 3 3"]
     """Local rotations of the reference pose."""
     align: Float[np.ndarray, "J 3 3"]
     """``R_joint_anatomy`` of every joint."""
     world: Float[np.ndarray, "3 3"]
-    """``R_world_body`` of a person who faces forward in the world of the rig's motions: columns left, up, forward."""
+    """``R_world_body`` of a person facing forward in the world of the rig's motions: columns left, up, forward."""
     height: float
-    """From the lowest point to the highest of the reference pose, along the body, as read (metres if rightly read);
-    of a rig without legs, what an adult with such arms has."""
+    """Height of the reference pose along the body, in the unit as read (metres if read correctly); of a rig without
+    legs, that of an adult with such arms."""
     notes: tuple[str, ...]
     """How the reference pose, the axes and the unit were found."""
 
@@ -55,7 +55,7 @@ class Rig:
 
     @property
     def unit_factor(self) -> float:
-        """What lengths must be multiplied by to be metres: 1 unless the file was in an unusual unit."""
+        """Factor from the unit as read to metres: 1 unless the file has an unusual unit."""
         return _guess_unit(self.height)[1]
 
     @property
@@ -75,17 +75,18 @@ def find_rig(
     """Find the body in a rig.
 
     Parts are found by names; where these do not give both arms, by topology and bone lengths. The reference pose is
-    the zero pose of the file if that shows a standing person, or else the frame of the motion that does best.
+    the zero pose of the file if that is a standing person, or else the frame of the motion nearest to one.
 
     Args:
-        source: a motion, or only its skeleton; the motion also tells which way is up and can lend a reference pose.
-        name: how errors call it, such as the file's name.
+        source: a motion, or only its skeleton; a motion also gives the vertical axis and candidates for the reference
+            pose.
+        name: what errors call the rig, such as its file name.
         rest: ``"auto"``, ``"zero"`` for the zero pose, or the number of a frame.
         up: the vertical axis of the rig's motions, such as ``"Z"`` or ``"-Y"``; None finds it.
         joints: parts given by hand, such as ``{"L_Elbow": "joint17"}``; they come before what is found.
 
     Raises:
-        InputError: no two arms are found, or no pose shows a standing person.
+        InputError: no two arms are found, or no pose is that of a standing person.
     """
     skeleton = source if isinstance(source, Skeleton) else source.skeleton
     motion = None if isinstance(source, Skeleton) else source
@@ -127,16 +128,16 @@ def _reference_pose(
     if motion is None or motion.frames == 0:
         raise InputError(
             f"{name}: the zero pose of the skeleton is no standing person ({odd:.0f} degrees off); "
-            "give a motion on it that shows one, or say which frame does."
+            "give a motion with such a pose, or the number of its frame."
         )
     rows = np.unique(np.linspace(0, motion.frames - 1, 2000).astype(int))
     rotations = np.asarray(motion.rotations)[rows].astype(np.float64)
     scores = oddness(_places(skeleton, rotations), roles)
-    # The first frame is where a T-pose stands if there is one.
+    # A T-pose, where there is one, is the first frame.
     best = 0 if scores[0] <= _GOOD_POSE else int(np.argmin(scores))
     if scores[best] > min(odd, _WORST_POSE):
         raise InputError(
-            f"{name}: neither the zero pose nor a frame shows a person standing with straight limbs (best: frame "
+            f"{name}: neither the zero pose nor a frame is a person standing with straight limbs (best: frame "
             f"{rows[best]}, {scores[best]:.0f} degrees off); add a T-pose as first frame or name a frame."
         )
     note = f"reference: frame {rows[best]} ({scores[best]:.0f} degrees from upright with straight limbs)"
@@ -149,9 +150,9 @@ def _places(skeleton: Skeleton, rotations: Float[np.ndarray, "*t J 3 3"]) -> Flo
 
 
 def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "3 3"]:
-    """The body frame along the world's axes where it nearly is: who poses stands upright.
+    """The body frame, aligned with the world's axes where it nearly is, since a posing person stands upright.
 
-    A drawn pose faces along an axis as well; a captured person may face anywhere.
+    A modelled pose (``drawn``) also faces along an axis; a captured person may face anywhere.
     """
     axes = snapped(body, 15.0)
     if axes is None or drawn:
@@ -165,7 +166,7 @@ def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "
 def _world_axes(
     motion: Motion | None, roles: dict[str, int], body: Float[np.ndarray, "3 3"], up: str | None, name: str
 ) -> Float[np.ndarray, "3 3"]:
-    """Left, up and forward in the world of the motion; forward as drawn where the drawing stands upright in it."""
+    """Left, up and forward in the world of the motion; forward as in the reference pose where that is upright in it."""
     vertical = body[:, 1]
     if motion is not None and motion.frames and up is None:
         rows = np.unique(np.linspace(0, motion.frames - 1, 200).astype(int))
@@ -186,7 +187,7 @@ def _world_axes(
 
 
 def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> float:
-    """From shoulder over elbow to wrist, the mean of both sides."""
+    """Length from shoulder over elbow to wrist, the mean of both sides."""
     chain = ("Shoulder", "Elbow", "Wrist")
     bones = [
         places[roles[f"{side}_{end}"]] - places[roles[f"{side}_{start}"]]
@@ -197,7 +198,7 @@ def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> floa
 
 
 def _guess_unit(height: float) -> tuple[str, float]:
-    # The reader takes lengths for metres or centimetres; what then is no adult was in another unit.
+    # The reader assumes metres or centimetres; a height that is no adult's means another unit.
     if _ADULT[0] <= height <= _ADULT[1] or height <= 0:
         return _UNITS[0]
     return min(_UNITS, key=lambda unit: abs(np.log(height * unit[1] / 1.7)))
