@@ -1,7 +1,7 @@
 """Read BVH files.
 
-BVH (Biovision hierarchy) has no standard; this reads what capture systems, Blender, MotionBuilder, Maya and the
-research data sets write. The rotation channels of a joint multiply from left to right in the order of the file:
+BVH (Biovision hierarchy) has no standard; this module reads the files of capture systems, Blender, MotionBuilder, Maya
+and research data sets. The rotation channels of a joint multiply from left to right in the order of the file:
 ``Zrotation Xrotation Yrotation`` means ``R = Rz @ Rx @ Ry``, in degrees.
 """
 
@@ -23,7 +23,7 @@ from a2g_jax.io.frame_rate import rate_from_frame_time
 #: A skeleton larger than this at rest is in centimetres.
 _LARGEST_BODY = 10.0
 
-# Possessive, so that a line of a million spaces takes a million steps and not their square.
+# Possessive quantifiers: linear time on long lines of spaces.
 _FRAMES = re.compile(r"Frames?\s*+:?\s*+(\S++)$", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"Frame\s*+Time\s*+:?\s*+(\S++)$", re.IGNORECASE)
 
@@ -35,20 +35,19 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     the world (in place of its OFFSET); a coordinate without a channel comes from OFFSET. Position channels of
     another joint are its bone: a motion has fixed bone lengths, so their mean over time is used as its offset.
 
-    The frame rate is the usual rate that the file's rounded frame time stands for
-    (:func:`~a2g_jax.io.frame_rate.rate_from_frame_time`). The number of frames in the header is checked against the
-    lines there are.
+    The frame rate is the usual rate nearest to the file's rounded frame time
+    (:func:`~a2g_jax.io.frame_rate.rate_from_frame_time`). The number of frames in the header must be that of the lines.
 
     Args:
         path: the file.
-        scale: metres in one unit of the file. None guesses: a skeleton that is larger than 10 units at rest, along
-            any axis, is in centimetres (0.01), any other in metres (1).
+        scale: metres in one unit of the file. None guesses: centimetres (0.01) for a skeleton larger than 10 units at
+            rest along any axis, otherwise metres (1).
 
     Returns:
         Float32 motion in metres, joints in file order.
 
     Raises:
-        InputError: the file is no BVH file or is damaged; the message names the line.
+        InputError: the file is not a BVH file or is damaged; the message names the line.
     """
     return read_with_layout(path, scale=scale)[0]
 
@@ -67,7 +66,7 @@ def read_with_layout(path: str | os.PathLike[str], *, scale: float | None = None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # only names hold letters, and any name will do
+        text = data.decode("latin-1")  # letters occur in names only, and any name is valid
     text = text.replace("\r\n", "\n").replace("\r", "\n")
 
     start = re.search(r"^[ \t]*MOTION[ \t]*$", text, re.IGNORECASE | re.MULTILINE)
@@ -91,7 +90,7 @@ def read_with_layout(path: str | os.PathLike[str], *, scale: float | None = None
 
 
 def _motion_header(path: object, lines: list[str], line: int) -> tuple[int, str, list[str], int]:
-    # lines[0] is what follows MOTION in its line, which is number ``line``.
+    # lines[0] is the rest of the line of MOTION, which is number ``line``.
     at = _next_filled(lines, 0)
     found = _FRAMES.match(lines[at].strip())
     if not found:
@@ -114,7 +113,7 @@ def _motion_header(path: object, lines: list[str], line: int) -> tuple[int, str,
 
 
 def _next_filled(lines: list[str], at: int) -> int:
-    # The last line if none is filled.
+    # The index of the next line with content, or of the last line.
     while at < len(lines) - 1 and not lines[at].strip():
         at += 1
     return min(at, len(lines) - 1)
@@ -125,7 +124,7 @@ def _at(lines: list[str], at: int) -> str:
 
 
 def _motion_values(path: object, lines: list[str], first: int, frames: int, channels: int) -> Float[np.ndarray, "T C"]:
-    # The whole block at once; only when that fails, line by line to find the place.
+    # The whole block at once; line by line only to locate an error.
     if not any(line.strip() for line in lines):
         fail(path, first, f"expected {frames} frames after the frame time; got the end of the file.")
     try:
@@ -139,7 +138,7 @@ def _motion_values(path: object, lines: list[str], first: int, frames: int, chan
     if len(values) != frames:
         filled = [at for at, line in enumerate(lines) if line.strip()]
         what = "is the file cut short?" if len(values) < frames else "correct the header or remove the rest."
-        fail(path, first + filled[-1], f"the header says {frames} frames and the file holds {len(values)}; {what}")
+        fail(path, first + filled[-1], f"the header says {frames} frames and the file has {len(values)}; {what}")
     return values
 
 

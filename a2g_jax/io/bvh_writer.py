@@ -16,31 +16,31 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, Layout
 from a2g_jax.io.files import atomic_path
 
-#: Length in metres of the End Site of a leaf joint that has none.
+#: Length in metres of the End Site added to a leaf joint without one.
 _TIP = 0.05
 #: Decimals of an angle in degrees.
 _ANGLE_DECIMALS = 6
-#: Degrees by which rotation channels may miss a rotation without a word.
+#: Largest error in degrees of rotation channels that is not reported.
 _CLOSE = 0.1
 
 
 def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY", scale: float = 100.0) -> None:
     """Write a motion as BVH: six channels for the root, three for every other joint.
 
-    Angles run on without jumps of 360 degrees from frame to frame, so that editors interpolate them well. Numbers
-    are fixed-point: lengths to 10 nanometres or better, angles to a millionth of a degree. Spaces and braces in joint
-    names become underscores, and leaf joints without an end get an End Site of 5 cm along their bone.
+    Angles have no jumps of 360 degrees between frames, so that editors interpolate them well. Numbers are fixed-point:
+    lengths to 10 nanometres or better, angles to a millionth of a degree. Spaces and braces in joint names become
+    underscores, and leaf joints without an end get an End Site of 5 cm along their bone.
 
-    BVH nests its joints, so a reader gets them in depth-first order: compare with the original by name.
+    Joints of BVH files are in depth-first order: compare them with the original by name.
 
     Args:
-        path: written atomically; missing folders are made.
+        path: written atomically; missing folders are created.
         order: the rotation channels, a permutation of ``XYZ``.
-        scale: units of the file in a metre: 100 writes centimetres.
+        scale: units of the file per metre: 100 writes centimetres.
 
     Raises:
         ValueError: an unknown order or scale.
-        InputError: the motion has no frames or holds NaN or infinities, or the file cannot be written.
+        InputError: the motion has no frames, NaN or infinities, or the file cannot be written.
     """
     if sorted(order) != ["X", "Y", "Z"]:
         raise ValueError(f"Expected the rotation order as a permutation of XYZ; got {order!r}.")
@@ -59,18 +59,17 @@ def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY
 def write_like(path: str | os.PathLike[str], motion: Motion, layout: Layout) -> dict[str, float]:
     """Write a motion in the layout of the file that its skeleton was read from: names, channels, orders and unit.
 
-    Angles run on as in :func:`write_bvh`. A joint with fewer than three rotation channels is written as closely as
-    they allow.
+    Angles have no jumps, as in :func:`write_bvh`. Joints with fewer than three rotation channels are approximated.
 
     Args:
-        path: written atomically; missing folders are made.
+        path: written atomically; missing folders are created.
         layout: of a file with the joints of the motion, as :func:`~a2g_jax.io.bvh.read_with_layout` gives it.
 
     Returns:
         Largest error in degrees by joint, of the joints whose channels miss a rotation by more than 0.1 degrees.
 
     Raises:
-        InputError: the motion has no frames or holds NaN or infinities, or the file cannot be written.
+        InputError: the motion has no frames, NaN or infinities, or the file cannot be written.
     """
     rotations, root = _checked(path, motion)
     offsets = np.asarray(motion.skeleton.offsets, np.float64) / layout.scale
@@ -188,21 +187,21 @@ def _hierarchy(skeleton: Skeleton, walk: list[int], order: str, scale: float, pl
 
 
 def _tip(bone: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    # A leaf's own frame is parallel to its parent's at rest, so the bone's direction holds in it.
+    # At rest a leaf's frame is parallel to its parent's, so the bone's direction is the same in both.
     length = float(np.linalg.norm(bone))
     x, y, z = (bone / length * _TIP).tolist() if length > 1e-9 else (0.0, _TIP, 0.0)
     return x, y, z
 
 
 def _file_names(names: tuple[str, ...]) -> list[str]:
-    taken: set[str] = set()
+    used: set[str] = set()
     result = []
     for name in names:
         plain = unique = re.sub(r"[\s{}\0]", "_", name.strip()) or "joint"
         number = 2
-        while unique in taken:
+        while unique in used:
             unique = f"{plain}_{number}"
             number += 1
-        taken.add(unique)
+        used.add(unique)
         result.append(unique)
     return result

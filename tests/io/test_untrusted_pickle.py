@@ -126,7 +126,7 @@ def test_refused_by_name_and_not_run(name, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_canary_would_sing(tmp_path, monkeypatch):
+def test_pickle_itself_runs_the_payload(tmp_path, monkeypatch):
     # Python's own reader runs what ours refuses, so the test above tests something.
     monkeypatch.chdir(tmp_path)
     pickle.loads(REFUSED["os.system"])  # noqa: S301
@@ -201,7 +201,7 @@ CLAIMS = {
 
 
 @pytest.mark.parametrize("name", CLAIMS)
-def test_claimed_sizes_are_not_believed(name):
+def test_claimed_sizes_are_not_trusted(name):
     attempt(decode_pickle, CLAIMS[name])
     assert peak_memory(decode_pickle, CLAIMS[name], NAME) < 60_000
 

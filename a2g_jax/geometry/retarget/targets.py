@@ -115,13 +115,11 @@ class _Person:
         self.body = self.frames[rig.roles["Chest"]]
 
     def hips(self) -> Float[np.ndarray, "3"]:
-        """Position of the pelvis; the midpoint of the hips where the rig has no joint between them and the spine."""
+        """Position of the pelvis; the midpoint of the hips where no joint lies between them and the spine."""
         roles = self.rig.roles
         missing = [f"{s}_{p}" for s in "LR" for p in ("Hip", "Knee", "Ankle") if f"{s}_{p}" not in roles]
         if missing:
-            raise InputError(
-                f"The rig lacks {', '.join(missing)}: it gives no full body; use upper-body, or give the joints by hand."
-            )
+            raise InputError(f"The rig lacks {', '.join(missing)}: it gives no full body; give the joints by hand.")
         if roles.get("Pelvis", roles["Chest"]) != roles["Chest"]:
             return self.places[roles["Pelvis"]]
         return (self.places[roles["L_Hip"]] + self.places[roles["R_Hip"]]) / 2

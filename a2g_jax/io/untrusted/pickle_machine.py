@@ -1,4 +1,4 @@
-"""The stack machine that pickles are programs for, with the operations that build plain values."""
+"""The stack machine of pickles, limited to operations that build plain values."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,13 +9,13 @@ from a2g_jax.io.untrusted.pickle_objects import Unfinished, find_global, finish,
 from a2g_jax.io.untrusted.pickle_opcodes import Opcodes
 from a2g_jax.io.untrusted.values import check_key
 
-#: Bytes that a value and its place on the stack count for.
+#: Bytes charged for a value and its place on the stack.
 _SMALL, _CONTAINER = 64, 240
 _HIGHEST_PROTOCOL = 5
 
 
 class PickleMachine:
-    """One run over one pickle."""
+    """Executes one pickle as data."""
 
     def __init__(self, data: bytes, budget: Budget) -> None:
         self.opcodes = Opcodes(data, budget)
@@ -33,7 +33,7 @@ class PickleMachine:
         """The value of the whole pickle.
 
         Raises:
-            InputError: damaged, or not made of plain values.
+            InputError: damaged, or with other than plain values.
         """
         for name, argument in self.opcodes:
             act = _ACTIONS.get(name)
@@ -56,17 +56,17 @@ class PickleMachine:
 
     def pop(self) -> Any:
         if not self.stack:
-            raise self.damage("it takes a value that is not there")
+            raise self.damage("it uses a value of an empty stack")
         return self.stack.pop()
 
     def top(self, kind: type) -> Any:
         if not self.stack or type(self.stack[-1]) is not kind:
-            raise self.damage(f"it adds to a {kind.__name__} that is not there")
+            raise self.damage(f"it adds to a {kind.__name__} that does not exist")
         return self.stack[-1]
 
     def marked(self) -> list[Any]:
         if not self.outer:
-            raise self.damage("it goes back to a mark that is not there")
+            raise self.damage("it uses a mark that does not exist")
         items, self.stack = self.stack, self.outer.pop()
         return items
 
@@ -88,18 +88,18 @@ class PickleMachine:
         text.encode("utf-8")  # pickletools lets half a surrogate pair pass, which is no text
         self.push(text)
 
-    def old_text(self, raw: bytes) -> None:
+    def python2_text(self, raw: bytes) -> None:
         self.push(raw.decode("ascii") if raw.isascii() else raw)
 
     def remember(self, key: int) -> None:
         if not self.stack:
-            raise self.damage("it remembers a value that is not there")
+            raise self.damage("it stores a value of an empty stack")
         self.budget.charge(_SMALL, self.at)
         self.memo[key] = self.stack[-1]
 
     def recall(self, key: int) -> None:
         if key not in self.memo:
-            raise self.damage(f"it recalls value {clip(key)}, which it never made")
+            raise self.damage(f"it recalls value {clip(key)}, which it never stored")
         value = self.memo[key]
         if isinstance(value, Unfinished):
             if not value.done:
@@ -152,7 +152,7 @@ class PickleMachine:
         self.add_pairs(result, self.marked())
         self.push(result, _CONTAINER)
 
-    def make_frozen(self) -> None:
+    def make_frozenset(self) -> None:
         members: set[Any] = set()
         self.add_members(members, self.marked())
         self.push(frozenset(members), _CONTAINER)
@@ -204,9 +204,9 @@ _ACTIONS: dict[str, Callable[[PickleMachine, Any], None]] = {
     ),
     **dict.fromkeys(("UNICODE", "BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8"), PickleMachine.text),
     **dict.fromkeys(("BINBYTES", "SHORT_BINBYTES", "BINBYTES8", "BYTEARRAY8"), PickleMachine.push),
-    "STRING": PickleMachine.old_text,
-    "BINSTRING": lambda m, text: m.old_text(text.encode("latin-1")),
-    "SHORT_BINSTRING": lambda m, text: m.old_text(text.encode("latin-1")),
+    "STRING": PickleMachine.python2_text,
+    "BINSTRING": lambda m, text: m.python2_text(text.encode("latin-1")),
+    "SHORT_BINSTRING": lambda m, text: m.python2_text(text.encode("latin-1")),
     # Containers.
     "MARK": lambda m, _: m.mark(),
     "EMPTY_LIST": lambda m, _: m.push([], _CONTAINER),
@@ -224,7 +224,7 @@ _ACTIONS: dict[str, Callable[[PickleMachine, Any], None]] = {
     "SETITEMS": lambda m, _: m.set_items(),
     "EMPTY_SET": lambda m, _: m.push(set(), _CONTAINER),
     "ADDITEMS": lambda m, _: m.add_items(),
-    "FROZENSET": lambda m, _: m.make_frozen(),
+    "FROZENSET": lambda m, _: m.make_frozenset(),
     # The stack and the memo.
     "POP": lambda m, _: m.drop(),
     "POP_MARK": lambda m, _: m.drop_marked(),
