@@ -1,4 +1,4 @@
-"""Compiled programs kept between runs: XLA compiles for seconds what it runs in milliseconds."""
+"""A persistent cache of compiled programs: XLA needs seconds to compile what runs in milliseconds."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ _MOST_BYTES = 500_000_000
 
 
 def keep_compilations() -> None:
-    """Keep compiled programs in the user's cache folder, unless JAX is told another one."""
+    """Cache compiled programs in the user's cache folder, unless JAX is configured with another one."""
     if os.environ.get("JAX_COMPILATION_CACHE_DIR") is None:
         cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
         folder = Path(cache) / "a2g_jax" / "xla"
@@ -20,9 +20,9 @@ def keep_compilations() -> None:
 
 
 def drop_unfinished(folder: Path) -> None:
-    """Remove programs without the note of their last use, left by a kill between the two writes.
+    """Remove programs without the file of their last use, left by a kill between the two writes.
 
-    With one of them in the folder JAX keeps no further program.
+    With one of them in the folder, JAX caches no further program.
     """
     for program in folder.glob("*-cache"):
         if not program.with_name(program.name.removesuffix("cache") + "atime").exists():

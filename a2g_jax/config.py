@@ -1,4 +1,4 @@
-"""Settings as frozen dataclasses: from JSON, from command-line text, and what differs between two."""
+"""Settings as frozen dataclasses, from JSON and from command-line text."""
 
 import dataclasses
 import types
@@ -16,7 +16,7 @@ def from_json(cls: type[Config], values: Mapping[str, Any], where: str) -> Confi
     """A settings object from JSON values; lists become tuples.
 
     Raises:
-        InputError: an unknown field, or a value of another kind than the field's; the message starts with ``where``.
+        InputError: an unknown field, or a value of another type than the field's; the message starts with ``where``.
     """
     hints = typing.get_type_hints(cls)
     fields = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
@@ -30,7 +30,7 @@ def parse_text(cls: type[Any], name: str, text: str) -> Any:
     """The value of field ``name`` written as command-line text; tuples are comma-separated.
 
     Raises:
-        InputError: the text is not a value of the field's kind.
+        InputError: the text is not a value of the field's type.
     """
     kind = typing.get_type_hints(cls)[name]
     flag = "--" + name.replace("_", "-")

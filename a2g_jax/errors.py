@@ -1,4 +1,4 @@
-"""The errors this package raises for what users hand it."""
+"""Errors for invalid input, and for interruptions."""
 
 
 class A2GError(Exception):
@@ -6,8 +6,8 @@ class A2GError(Exception):
 
 
 class Interrupted(A2GError):
-    """Training was stopped from outside after saving its state."""
+    """Work was interrupted from outside, after saving its state."""
 
 
 class InputError(A2GError, ValueError):
-    """A file or value that cannot be used: the message names it, the place in it and the mend."""
+    """A file or value that cannot be used: the message names it, the place in it and the fix."""

@@ -19,8 +19,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget import Rig, find_rig, match_rigs, retarget
 from a2g_jax.geometry.retarget.poses import joint_places, rotation_angle, world_rotations
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh import read_bvh, write_bvh
-from a2g_jax.io.bvh_like import read_with_layout, write_like
+from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh, write_like
 from a2g_jax.io.files import atomic_path
 from a2g_jax.talker.recordings import talk
 

@@ -44,8 +44,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     from a2g_jax.geometry.mirror import mirror
     from a2g_jax.geometry.motion import resample
     from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_skeleton
-    from a2g_jax.io.bvh import read_bvh, write_bvh
-    from a2g_jax.io.bvh_like import read_with_layout, write_like
+    from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh, write_like
 
     source_path = Path(options.source)
     motion = read_bvh(source_path)

@@ -5,12 +5,13 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 from a2g_jax import __version__
 from a2g_jax.data.corpus import (
@@ -29,7 +30,6 @@ from a2g_jax.data.featurise import Prepared as Prepared
 from a2g_jax.data.featurise import Skipped as Skipped
 from a2g_jax.data.featurise import prepare_recording as prepare_recording
 from a2g_jax.data.journal import Unfinished
-from a2g_jax.data.lock import HeldError, hold
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Splits, official_splits
 from a2g_jax.errors import InputError, Interrupted
@@ -182,15 +182,22 @@ def _place(path: Path) -> Iterator[Path]:
     if not folder.exists():
         _refuse_existing(path)
     make_folder(path.parent)
+    lock = FileLock(path.parent / f".{path.name}.lock")
     try:
-        with hold(path.parent / f".{path.name}.lock"):
-            if os.path.lexists(path):
-                # The process that finished it was killed before it had removed the unfinished work.
-                shutil.rmtree(folder, ignore_errors=True)
-            _refuse_existing(path)
-            yield folder
-    except HeldError:
+        lock.acquire(timeout=0)
+    except Timeout:
         raise InputError(f"{path}: another process is preparing it; wait for it or choose another folder.") from None
+    try:
+        if os.path.lexists(path):
+            # The process that finished the corpus was killed before it had removed its working files.
+            shutil.rmtree(folder, ignore_errors=True)
+        _refuse_existing(path)
+        yield folder
+    finally:
+        # Removed while locked, so that no process removes the lock of the next one; Windows removes it on release.
+        with suppress(OSError):
+            Path(lock.lock_file).unlink()
+        lock.release()
 
 
 def _discard_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:

@@ -1,4 +1,4 @@
-"""Random changes to log-mel features, so that a model trained on one microphone hears another."""
+"""Data augmentation of log-mel features: other microphones, rooms and background noise."""
 
 import jax
 import jax.numpy as jnp
@@ -8,13 +8,13 @@ from jaxtyping import Array, Float, Key, Scalar
 def augment_log_mel(
     key: Key[Array, ""], decibels: Float[Array, "T bands"], strength: float | Float[Scalar, ""] = 1.0
 ) -> Float[Array, "T bands"]:
-    """One clip as another microphone in another room might have given it: gain, equaliser and background noise.
+    """A clip with random gain, equaliser and background noise, as from another microphone in another room.
 
-    Everything is drawn once for the clip and constant in time, so rhythm is untouched.
+    All of them are drawn once for the clip and constant in time, so the rhythm stays the same.
 
     Args:
-        strength: 0 changes nothing; 1 means a gain of +-3 dB, an equaliser of three smooth bumps of +-6 dB with a
-            tilt of +-6 dB, and noise that fills the valleys up to 15 dB above the clip's floor.
+        strength: 0 for no change; 1 for a gain of +-3 dB, an equaliser of three smooth bumps of +-6 dB with a tilt of
+            +-6 dB, and noise of up to 15 dB above the clip's floor.
     """
     gain_key, tilt_key, bump_key, noise_key, colour_key = jax.random.split(key, 5)
     bands = decibels.shape[1]
@@ -24,7 +24,7 @@ def augment_log_mel(
     waves = jnp.stack([jnp.cos(jnp.pi * n * place) for n in (1, 2, 3)])
     bumps = 2.0 * jax.random.uniform(bump_key, (3,), minval=-1.0) @ waves
     changed = decibels + strength * (gain + tilt + bumps)[None]
-    # Noise adds to power, not to decibels.
+    # Noise is added to power, not to decibels.
     floor = jnp.min(decibels) + strength * 15.0 * jax.random.uniform(noise_key)
     colour = 4.0 * strength * jax.random.uniform(colour_key, minval=-1.0) * place
     return (

@@ -18,10 +18,10 @@ def _basis(points: int) -> Float[np.ndarray, "points points"]:
 def block_dct(signal: Float[Array, "*batch T C"], points: int) -> Float[Array, "*batch T C"]:
     """Orthonormal DCT-II of every ``points`` frames: row ``b * points + k`` is band k of block b.
 
-    Band k is ``k / 2`` periods a block. Energy stays the same, and the transform is linear.
+    Band k has ``k / 2`` periods per block. The transform is linear and preserves energy.
 
     Raises:
-        ValueError: T is no multiple of ``points``.
+        ValueError: T is not a multiple of ``points``.
     """
     return _apply(signal, _basis(points))
 
@@ -30,7 +30,7 @@ def block_idct(bands: Float[Array, "*batch T C"], points: int) -> Float[Array, "
     """Inverse of :func:`block_dct`.
 
     Raises:
-        ValueError: T is no multiple of ``points``.
+        ValueError: T is not a multiple of ``points``.
     """
     return _apply(bands, _basis(points).T)
 

@@ -1,4 +1,4 @@
-"""Log-mel spectrograms whose frames lie exactly on the motion's frames."""
+"""Log-mel spectrograms aligned exactly with the frames of the motion."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -7,34 +7,34 @@ import numpy as np
 from jaxtyping import Float
 from scipy import fft, signal
 
-#: Frames transformed at once: bounds memory at about 60 MB whatever the length of the audio.
+#: Frames transformed at once: bounds memory to about 60 MB for audio of any length.
 _CHUNK = 4096
 
 
 @dataclass(frozen=True)
 class MelConfig:
-    """What a log-mel frame holds; defaults as Audio2Gestures (Sec. 5.3.1) with the level brought to a fixed value."""
+    """Settings of log-mel features; defaults as in Audio2Gestures (Sec. 5.3.1), with levels normalised."""
 
     sample_rate: int = 16000
-    """Samples per second the audio is resampled to first."""
+    """Samples per second, to which audio is resampled first."""
     bands: int = 64
     """Number of mel bands (Slaney's scale and area normalisation, as librosa's default)."""
     window: int = 2048
     """Length of the Hann window and of the Fourier transform, in samples."""
     level_db: float | None = -23.0
-    """Level that active speech is brought to, in dB relative to full scale; None leaves the audio as it is."""
+    """Level to which active speech is normalised, in dB relative to full scale; None for no normalisation."""
     range_db: float = 60.0
-    """Bands quieter than the loudest one by more than this are raised to that floor (librosa's ``top_db``)."""
+    """Dynamic range: bands further below the loudest one are raised to this floor (librosa's ``top_db``)."""
     low_hz: float = 0.0
-    """Where the lowest band begins."""
+    """Lower edge of the lowest band."""
     high_hz: float | None = None
-    """Where the highest band ends; None is half the sample rate."""
+    """Upper edge of the highest band; None is half the sample rate."""
     stack: int = 1
-    """Spectra for each motion frame, evenly spaced from its time on, side by side in one row."""
+    """Spectra per motion frame, evenly spaced from its time on and concatenated to one row."""
 
     @property
     def width(self) -> int:
-        """Values in a row."""
+        """Number of values in a row."""
         return self.bands * self.stack
 
 
@@ -43,14 +43,14 @@ def mel_filters(
     sample_rate: int, window: int, bands: int, low_hz: float = 0.0, high_hz: float | None = None
 ) -> Float[np.ndarray, "bands bins"]:
     """Triangular mel filters on the bins of a Fourier transform of ``window`` samples."""
-    import librosa  # late: it costs seconds
+    import librosa  # here, because it takes seconds
 
     filters = librosa.filters.mel(sr=sample_rate, n_fft=window, n_mels=bands, fmin=low_hz, fmax=high_hz)
     return filters.astype(np.float32)
 
 
 def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
-    """Level in dB of full scale of the parts where someone speaks, in the spirit of ITU-T P.56.
+    """Level of active speech in dB relative to full scale, similar to ITU-T P.56.
 
     Mean power of the 25 ms frames that are less than 25 dB below the loud ones (95th percentile), so pauses and room
     noise do not count.
@@ -73,9 +73,9 @@ def log_mel(
 ) -> Float[np.ndarray, "frames width"]:
     """Log-mel energies in dB, one row for each motion frame (with ``config.stack`` spectra in it).
 
-    The window of frame k is centred on time ``k / fps``, rounded to the nearest sample each time on its own, so the
-    features never drift from the motion; a fixed integer hop would (0.1 s in 166 s at 30 fps and 16 kHz). Beyond the
-    ends the audio counts as zeros.
+    The window of frame k is centred on time ``k / fps``, rounded to the nearest sample for every frame, so the features
+    never drift from the motion; with a fixed integer hop they would (0.1 s in 166 s at 30 fps and 16 kHz). The audio is
+    padded with zeros.
 
     Args:
         audio: mono samples at ``config.sample_rate``.
@@ -105,5 +105,5 @@ def _log_mel_rows(
         spectrum = fft.rfft(some, axis=1)
         rows[start : start + _CHUNK] = (spectrum.real**2 + spectrum.imag**2) @ filters
     decibels = 10 * np.log10(np.maximum(rows, 1e-10))
-    # Again -100 at the least: a logarithm in single precision may round below it on some machines.
+    # At least -100 again: on some machines a logarithm in single precision rounds below it.
     return np.maximum(decibels, max(-100.0, decibels.max(initial=-100.0) - config.range_db)).astype(np.float32)

@@ -1,6 +1,6 @@
-"""Similarity of how motions go: spectra over short windows, means, spreads and correlations over time, deep features.
+"""Similarity of motions over time: STFT distance, structural similarity and distance of deep features.
 
-Signals are (..., T, C): C coordinates of joints over T frames. All are differentiable everywhere, so that they serve as
+Signals are (..., T, C): C coordinates of joints over T frames. All functions are differentiable everywhere, to serve as
 metrics and as training losses (Audio2Gestures, extended, Sec. 4.1.2 to 4.1.4).
 """
 
@@ -12,16 +12,16 @@ from jaxtyping import Array, Float
 
 Signal = Float[Array | np.ndarray, "*batch T _"]
 
-#: Of the extended paper: frames in a Hann window and a transform, and frames between windows (a quarter).
+#: As in the extended paper: frames in a Hann window and a transform, and frames between windows (a quarter).
 STFT_WINDOW, STFT_HOP = 32, 8
-#: Inside the logarithm; positions in metres have spectra of hundredths, and a joint that never moves has none.
+#: Added inside the logarithm: spectra of positions in metres are of the order of 0.01, those of still joints zero.
 STFT_EPSILON = 1e-5
-#: Eq. 8 to 10.
+#: Constants of Eq. 8 to 10.
 SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
 
 
 def stft_magnitudes(signal: Signal, window: int = STFT_WINDOW, hop: int = STFT_HOP) -> Float[Array, "*batch W F C"]:
-    """Magnitudes of the short-time Fourier transform over time, of windows that lie wholly within the signal.
+    """Magnitudes of the short-time Fourier transform over time, of windows entirely within the signal.
 
     The Hann window is periodic, and magnitudes are not divided by its sum.
 
@@ -38,7 +38,7 @@ def stft_magnitudes(signal: Signal, window: int = STFT_WINDOW, hop: int = STFT_H
         pieces * hann[:, None].astype(signal.dtype).reshape((1,) * (pieces.ndim - 2) + (window, 1)), axis=-2
     )
     power = jnp.square(spectrum.real) + jnp.square(spectrum.imag)
-    # A root has no gradient at zero, where a still joint is.
+    # A root has no gradient at zero, the value of a still joint.
     return jnp.sqrt(power + STFT_EPSILON**2)
 
 
@@ -47,18 +47,18 @@ def stft_distance(
 ) -> Float[Array, "*batch"]:
     """Mean absolute difference of log magnitudes (Eq. 6).
 
-    ``mean |log |STFT(p)| - log |STFT(q)||`` over windows, frequencies and coordinates; the paper divides by the number
-    of frames instead, which makes the value depend on the number of joints.
+    ``mean |log |STFT(p)| - log |STFT(q)||`` over windows, frequencies and coordinates. The paper divides by the number
+    of frames instead, so that the value depends on the number of joints.
     """
     ours, theirs = (jnp.log(stft_magnitudes(signal, window, hop)) for signal in (predicted, target))
     return jnp.mean(jnp.abs(ours - theirs), axis=(-3, -2, -1))
 
 
 def ssim(predicted: Signal, target: Signal) -> Float[Array, "*batch"]:
-    """Structural similarity of each coordinate over time, averaged over coordinates (Eq. 7 to 13); 1 at the best.
+    """Structural similarity of each coordinate over time, averaged over coordinates (Eq. 7 to 13); at most 1.
 
     ``l c s`` with ``l`` of means, ``c`` of standard deviations and ``s`` of covariances (N - 1), C1 = 0.01^2, C2 =
-    0.03^2, C3 = C2 / 2: as ``c s = (2 cov + C2) / (var_p + var_q + C2)``, which has no root in it.
+    0.03^2, C3 = C2 / 2; computed as ``c s = (2 cov + C2) / (var_p + var_q + C2)``, without roots.
     """
     count = predicted.shape[-2] - 1
     mean_p, mean_q = (jnp.mean(signal, axis=-2) for signal in (predicted, target))
@@ -74,7 +74,7 @@ def lpips(predicted: Sequence[Signal], target: Sequence[Signal]) -> Float[Array,
     """Learned perceptual distance: over blocks, the mean over frames of the squared L2 distance of features (Eq. 14).
 
     Args:
-        predicted: features of one motion, a block of a network each; of any networks, but the same for both.
+        predicted: features of one motion, one array for each block of a network; the same network for both motions.
     """
     parts = [
         jnp.mean(jnp.sum(jnp.square(ours - theirs), axis=-1), axis=-1)

@@ -1,4 +1,4 @@
-"""Mean and standard deviation of features, and normalising by them."""
+"""Mean and standard deviation of features, and normalisation."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,13 +10,13 @@ from jaxtyping import Array, Float
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Per-feature mean and standard deviation, taken over a training split; a pytree."""
+    """Mean and standard deviation of each feature over a training split; a pytree."""
 
     mean: Float[Array | np.ndarray, "*feature"]
     std: Float[Array | np.ndarray, "*feature"]
 
     def normalise(self, x: Float[Array | np.ndarray, "..."]) -> Any:
-        """``(x - mean) / std`` over the trailing axes; NumPy stays NumPy."""
+        """``(x - mean) / std`` over the trailing axes; of NumPy arrays as NumPy."""
         return (x - self._like(self.mean, x)) / self._like(self.std, x)
 
     def denormalise(self, x: Float[Array | np.ndarray, "..."]) -> Any:
@@ -25,7 +25,7 @@ class Statistics:
 
     @staticmethod
     def _like(value, x):
-        # Leading axes are written out: the package runs under JAX's strict rank promotion.
+        # Explicit leading axes: the package runs under JAX's strict rank promotion.
         return value.reshape((1,) * (x.ndim - value.ndim) + value.shape)
 
 
@@ -41,7 +41,7 @@ class RunningStatistics:
         self.square: np.ndarray | float = 0.0
 
     def add(self, rows: Float[np.ndarray, "N *feature"]) -> None:
-        """Take in N more rows."""
+        """Add N rows."""
         count = len(rows)
         if count == 0:
             return
@@ -54,8 +54,8 @@ class RunningStatistics:
         self.count = total
 
     def result(self, floor: float) -> Statistics:
-        """Statistics so far; standard deviations below ``floor`` are raised to it, so constant features stay small."""
+        """Statistics of all rows so far; deviations of at least ``floor`` keep constant features small."""
         if self.count == 0:
-            raise ValueError("Expected at least one row before statistics are taken; got none.")
+            raise ValueError("Expected statistics of at least one row; got none.")
         std = np.sqrt(np.asarray(self.square) / self.count)
         return Statistics(mean=np.asarray(self.mean, np.float32), std=np.maximum(std, floor).astype(np.float32))

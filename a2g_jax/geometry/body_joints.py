@@ -1,4 +1,4 @@
-"""Finding the 22 body joints in a rig by the names that riggers give them."""
+"""The 22 body joints of a rig, found by joint names."""
 
 from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
@@ -7,10 +7,10 @@ from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 def find_body(skeleton: Skeleton) -> tuple[int, ...] | None:
     """Index of each of the 22 body joints (:data:`~a2g_jax.geometry.skeleton.BODY_JOINTS`, in their order).
 
-    Knows the names that :mod:`~a2g_jax.geometry.joint_names` lists, with any prefix (``mixamorig:``), case or
-    separator. Spines are counted, not named: of three or more between pelvis and neck the first, the middle and the
-    last are taken. None when a joint is missing or the tree contradicts the names;
-    :func:`~a2g_jax.geometry.retarget.find_rig` is content with less.
+    Recognises the names listed in :mod:`~a2g_jax.geometry.joint_names`, with any prefix (``mixamorig:``), case or
+    separator. Spines are identified by position: of three or more between pelvis and neck the first, the middle and the
+    last. None when a joint is missing or the tree contradicts the names;
+    :func:`~a2g_jax.geometry.retarget.find_rig` requires fewer joints.
     """
     joints = {role: joint for role, joint in named_joints(skeleton.names).items() if role in BODY_JOINTS}
     if "Pelvis" not in joints or "Neck" not in joints:
@@ -27,7 +27,7 @@ def find_body(skeleton: Skeleton) -> tuple[int, ...] | None:
 
 
 def path_up(parents: tuple[int, ...], joint: int, above: int) -> list[int] | None:
-    """The joints strictly between ``joint`` and its ancestor ``above``, from below; None where it is none."""
+    """The joints strictly between ``joint`` and its ancestor ``above``, from below; None if it is no ancestor."""
     path = []
     joint = parents[joint]
     while joint not in (-1, above):
@@ -37,7 +37,7 @@ def path_up(parents: tuple[int, ...], joint: int, above: int) -> list[int] | Non
 
 
 def _is_body_tree(skeleton: Skeleton, joints: tuple[int, ...]) -> bool:
-    """Whether each found joint hangs below the found parent."""
+    """Whether each joint is a descendant of its parent in the body."""
     if len(set(joints)) != len(joints):
         return False
     links = [(joint, joints[parent]) for joint, parent in zip(joints, BODY_PARENTS, strict=True) if parent >= 0]

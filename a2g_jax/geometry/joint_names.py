@@ -1,9 +1,9 @@
-"""What a rig's joint names say: the side, the part of the body, the finger and its bone.
+"""Side, part of the body, finger and bone from the joint names of rigs.
 
-Knows the names of BEAT, ZeroEGGS, Trinity and Mixamo (``LeftForeArm``), Talking With Hands (``b_l_forearm``), SMPL and
-SMPL-X (``L_Elbow``, ``left_elbow``), Unreal (``lowerarm_l``), 3ds Max Biped (``Bip01 L Forearm``), Blender
-(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of BEAT's users (``LArm1``) and their kin, with any prefix,
-case or separator.
+Recognises the names of BEAT, ZeroEGGS, Trinity and Mixamo (``LeftForeArm``), Talking With Hands (``b_l_forearm``), SMPL
+and SMPL-X (``L_Elbow``, ``left_elbow``), Unreal (``lowerarm_l``), 3ds Max Biped (``Bip01 L Forearm``), Blender
+(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``) and similar ones, with any
+prefix, case or separator.
 """
 
 import re
@@ -15,7 +15,7 @@ FINGERS = ("Index", "Middle", "Pinky", "Ring", "Thumb")
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")
 _SIDE = {"l": "L", "left": "L", "lt": "L", "r": "R", "right": "R", "rt": "R"}
-#: Words that riggers put before (or after) every name.
+#: Words that rigs put before (or after) every name.
 _CASING = frozenset(
     ("b", "p", "j", "m", "f", "c", "cc", "avg", "bip", "mixamorig", "valvebiped", "def", "org", "mch", "jnt", "joint")
 ) | {"bone", "character", "base", "bind", "rig"}
@@ -34,8 +34,8 @@ _FINGER_WORDS = (
 _BONES = {"metacarpal": 0, "carpal": 0, "meta": 0, "proximal": 1, "intermediate": 2, "distal": 3}
 _BIPED_FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 
-#: Names of the parts that have sides. The first that a rig has wins; a name that stands under two parts goes to the
-#: one that comes first here and still lacks a joint ("shoulder" is the upper arm in SMPL-X, the collar elsewhere).
+#: Names of the parts that have sides. The first name that a rig has wins; a name of two parts is that of the first
+#: part without a joint ("shoulder" is the upper arm in SMPL-X, the collar elsewhere).
 _SIDED: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Hip", ("upleg", "upperleg", "thigh", "femur", "hip", "upperleg01")),
     ("Knee", ("lowerleg", "calf", "shin", "knee", "lowleg", "tibia", "leg", "lowerleg01")),
@@ -52,21 +52,21 @@ _MIDDLE: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Neck", ("neck", "neck0", "neck00", "neck01", "neck1", "cervical")),
     ("Head", ("head", "head0", "head01")),
 )
-_KNOWN = {name for _, names in _SIDED for name in names}
+_SIDED_NAMES = {name for _, names in _SIDED for name in names}
 
 
 @dataclass(frozen=True)
 class JointName:
-    """One name taken apart."""
+    """A joint name split into side and rest."""
 
     side: str
     """``"L"``, ``"R"`` or ``""``."""
     base: str
-    """The rest in small letters and digits: ``"forearm"``."""
+    """The rest in lower-case letters and digits: ``"forearm"``."""
 
     @property
     def is_helper(self) -> bool:
-        """Whether this is a twist bone or another aid of a rigger that stands for no joint of a body."""
+        """Whether this is a twist bone or another helper that corresponds to no joint of a body."""
         return bool(_HELPER.search(self.base))
 
     @property
@@ -95,11 +95,11 @@ class JointName:
 
 
 def parse_name(name: str) -> JointName:
-    """Take one joint name apart."""
+    """Split one joint name."""
     words = [word.lower() for word in _WORD.findall(re.split("[:|]", name)[-1])]
     while len(words) > 1 and words[0] in _CASING:
         words = words[1:]
-        # The number of "Bip01" goes with it.
+        # With "Bip01" its number.
         if len(words) > 1 and words[0].isdigit():
             words = words[1:]
     while len(words) > 1 and words[-1] in _CASING and words[-1] not in ("b", "p", "m", "f", "c"):
@@ -113,16 +113,16 @@ def parse_name(name: str) -> JointName:
             return JointName(letter, base.replace(word, "", 1))
     # One letter without a separator ("lowerarmr") only where what remains is a part of the body.
     for letter, rest in ((base[-1:], base[:-1]), (base[:1], base[1:])):
-        if letter in ("l", "r") and rest in _KNOWN and base not in _KNOWN:
+        if letter in ("l", "r") and rest in _SIDED_NAMES and base not in _SIDED_NAMES:
             return JointName(letter.upper(), rest)
     return JointName("", base)
 
 
 def named_joints(names: Sequence[str]) -> dict[str, int]:
-    """Joints of a body by name: ``"L_Elbow"``, ``"Pelvis"``, ``"R_Index1"`` and so on to their indices.
+    """Indices of the joints of a body by role: ``"L_Elbow"``, ``"Pelvis"``, ``"R_Index1"`` ...
 
-    Roles are those of :data:`~a2g_jax.geometry.skeleton.BODY_JOINTS` without the spines, which are counted and not
-    named, and ``L_`` or ``R_`` with each finger and the number of its bone. A joint has one role at most.
+    Roles are those of :data:`~a2g_jax.geometry.skeleton.BODY_JOINTS` without the spines, which are identified by
+    position, and ``L_`` or ``R_`` with each finger and the number of its bone. A joint has one role at most.
     """
     parsed = [parse_name(name) for name in names]
     found: dict[str, int] = {}

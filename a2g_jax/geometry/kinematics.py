@@ -49,7 +49,7 @@ def _chain(rotations, offsets, parents):
 
 
 def _take(array, rows: tuple[int, ...]):
-    """The given rows; as a slice where they follow one another, since the gradient of a gather is a slow scatter."""
+    """The given rows; as a slice where they are consecutive, since the gradient of a gather is a slow scatter."""
     if rows == tuple(range(rows[0], rows[0] + len(rows))):
         return array[rows[0] : rows[0] + len(rows)]
     return array[np.array(rows)]

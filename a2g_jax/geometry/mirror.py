@@ -25,20 +25,22 @@ _FLIP = np.diag([-1.0, 1.0, 1.0])
 
 
 def mirror(motion: Motion, rig: Rig | None = None, *, keep_skeleton: bool = True) -> Motion:
-    """The motion seen in a mirror: left and right exchanged, the root's path reflected across the origin's plane.
+    """The mirrored motion: left and right exchanged, the root path reflected across the plane through the origin.
 
     Args:
         motion: on any humanoid rig.
         rig: that rig, if found before.
-        keep_skeleton: stay on the same skeleton: orientations are the mirrored ones, and positions too as far as
-            its two sides have equal bones. False mirrors the skeleton as well, and positions exactly.
+        keep_skeleton: keep the same skeleton: orientations are mirrored exactly, positions as far as both sides have
+            equal bones. False mirrors the skeleton too, and positions exactly.
 
     Raises:
-        InputError: the rig is not understood, or a joint has no partner on the other side.
+        InputError: the rig is not recognised, or a joint has no partner on the other side.
     """
     rig = find_rig(motion, name="the motion") if rig is None else rig
     if not motion.skeleton.same_tree(rig.skeleton):
-        raise InputError("The motion is on another skeleton than the rig it shall be mirrored with.")
+        raise InputError(
+            "The motion and the rig to mirror it with have different skeletons; find the rig in this motion."
+        )
     partner = list(mirror_pairs(rig))
     across = rig.world[:, 0]
     reflect = np.eye(3) - 2 * np.outer(across, across)
@@ -58,7 +60,7 @@ def mirror(motion: Motion, rig: Rig | None = None, *, keep_skeleton: bool = True
 def mirror_pairs(rig: Rig) -> tuple[int, ...]:
     """The joint on the other side of every joint, itself in the middle.
 
-    By part, then by name, then by where the children of paired joints lie.
+    By part, then by name, then by the positions of the children of paired joints.
 
     Raises:
         InputError: a joint has no partner; the message names it.
@@ -91,13 +93,13 @@ def mirror_pairs(rig: Rig) -> tuple[int, ...]:
         if wrong or (parent >= 0 and partner[parent] != skeleton.parents[partner[joint]]):
             raise InputError(
                 f"Joint {skeleton.names[joint]} and {skeleton.names[partner[joint]]} on the other side hang from "
-                "joints that are no partners; the rig cannot be mirrored."
+                "joints that are not partners; the rig cannot be mirrored."
             )
     return tuple(partner)
 
 
 def _opposite(rig: Rig, offsets: Float[np.ndarray, "J 3"], joint: int, partner: list[int]) -> int:
-    """The child of the parent's partner that lies nearest to the mirror image of a joint."""
+    """The child of the parent's partner that is nearest to the mirror image of a joint."""
     parents = rig.skeleton.parents
     above = parents[joint]
     other = partner[above]

@@ -1,4 +1,4 @@
-"""A motion: joint rotations and a root path over time, on a skeleton."""
+"""Motion of a skeleton: joint rotations and a root path over time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -59,7 +59,7 @@ def _world_rotations(rotations: Array, parents: tuple[int, ...]) -> Array:
     return jax.vmap(lambda frame: global_rotations(frame, parents))(rotations)
 
 
-#: Frames handled by one call of a compiled kernel, so that no length of motion compiles anew.
+#: Frames per call of a compiled kernel, so that a new length of motion needs no compilation.
 _CHUNK = 512
 
 
@@ -79,8 +79,8 @@ def _in_chunks(kernel: Callable[..., Array], *arrays: np.ndarray) -> np.ndarray:
 def resample(motion: Motion, fps: float, frames: int | None = None) -> Motion:
     """The same motion at another frame rate: slerp for rotations, linear for the root, at exact timestamps.
 
-    Frame k of the result shows time ``k / fps`` of the input, whose frame k shows ``k / motion.fps``; times after the
-    last input frame hold it.
+    Frame k of the result is the input at time ``k / fps``; frame k of the input is at ``k / motion.fps``. Beyond its
+    last frame, that frame is repeated.
 
     Args:
         frames: length of the result; by default ``round(motion.seconds * fps)``.

@@ -1,8 +1,8 @@
-"""Rotations of 3D space in the five forms that the field uses.
+"""Rotations of 3D space as matrices, quaternions, axis-angle vectors and 6D, for use under JAX.
 
 Matrices act on column vectors; quaternions are ``wxyz``; axis-angle is the exponential map (axis times angle in
-radians); Euler angles are intrinsic, in the order named, as BVH channels are; 6D is the first two *columns* of the
-matrix, one after the other (Zhou et al. 2019, "On the Continuity of Rotation Representations in Neural Networks").
+radians); 6D is the first two *columns* of the matrix, one after the other (Zhou et al. 2019, "On the Continuity of
+Rotation Representations in Neural Networks"). Euler angles are in :mod:`a2g_jax.geometry.euler`.
 
 Every function is written for one rotation and vmapped over leading axes by ``jnp.vectorize``. Where a formula has a
 removable singularity both branches of the ``where`` are finite, because the gradient of the branch not taken is
@@ -34,9 +34,9 @@ def safe_norm(vector: Float[Array, " n"]) -> Float[Array, ""]:
 
 @_vectorize(signature="(6)->(3,3)")
 def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
-    """Gram-Schmidt of the two 3-vectors in ``six``: always a rotation, also for zero, parallel or overflowing vectors.
+    """Rotation matrix by Gram-Schmidt of the two 3-vectors in ``six``, also of zero, parallel or overflowing vectors.
 
-    Degenerate input falls back to a fixed axis, with zero gradient through the part that carries no information.
+    Degenerate input falls back to a fixed axis, with zero gradient through the part without information.
     Written in components because XLA fuses those into one loop; with dot products and stacks of 3-vectors the
     gradient takes three times as long.
     """
@@ -71,7 +71,7 @@ def matrix_from_6d(six: Float[Array, " 6"]) -> Float[Array, "3 3"]:
 
 @_vectorize(signature="(3,3)->(6)")
 def matrix_to_6d(matrix: Float[Array, "3 3"]) -> Float[Array, " 6"]:
-    """The first two columns, one after the other."""
+    """The first two columns of the matrix, one after the other."""
     return matrix[:, :2].T.reshape(6)
 
 
@@ -108,21 +108,6 @@ def quaternion_from_matrix(matrix: Float[Array, "3 3"]) -> Float[Array, " 4"]:
     return jnp.where(row[0] < 0, -row, row)
 
 
-@_vectorize(signature="(4),(4)->(4)")
-def quaternion_multiply(left: Float[Array, " 4"], right: Float[Array, " 4"]) -> Float[Array, " 4"]:
-    """Hamilton product: the rotation ``right`` followed by ``left``."""
-    a, b, c, d = left
-    e, f, g, h = right
-    return jnp.array(
-        [
-            a * e - b * f - c * g - d * h,
-            a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f,
-            a * h + b * g - c * f + d * e,
-        ]
-    )
-
-
 @_vectorize(signature="(3)->(4)")
 def quaternion_from_axis_angle(vector: Float[Array, " 3"]) -> Float[Array, " 4"]:
     """Exponential map from axis times angle (radians) to a unit quaternion."""
@@ -156,71 +141,6 @@ def matrix_from_axis_angle(vector: Float[Array, "*batch 3"]) -> Float[Array, "*b
 def axis_angle_from_matrix(matrix: Float[Array, "*batch 3 3"]) -> Float[Array, "*batch 3"]:
     """Logarithm map of a rotation matrix, the angle in 0 to pi radians."""
     return axis_angle_from_quaternion(quaternion_from_matrix(matrix))
-
-
-def _axes(order: str) -> tuple[int, int, int]:
-    axes = tuple("XYZ".find(letter) for letter in order.upper())
-    if len(axes) != 3 or -1 in axes or axes[0] == axes[1] or axes[1] == axes[2]:
-        raise ValueError(f"Expected three of X, Y, Z, no two neighbours alike, such as 'ZXY'; got {order!r}.")
-    return axes  # type: ignore[return-value]
-
-
-def _axis_rotation(axis: int, angle):
-    c, s = jnp.cos(angle), jnp.sin(angle)
-    second, third = (axis + 1) % 3, (axis + 2) % 3
-    matrix = jnp.zeros((3, 3), angle.dtype).at[axis, axis].set(1.0)
-    matrix = matrix.at[second, second].set(c).at[third, third].set(c)
-    return matrix.at[third, second].set(s).at[second, third].set(-s)
-
-
-def matrix_from_euler(angles: Float[Array, "*batch 3"], order: str) -> Float[Array, "*batch 3 3"]:
-    """Matrix of intrinsic Euler angles in radians: ``R = R_first @ R_second @ R_third``.
-
-    Args:
-        angles: one angle for each letter of ``order``, in that order.
-        order: any of the twelve, such as ``"ZXY"`` or ``"XYX"``.
-    """
-    i, j, k = _axes(order)
-
-    @_vectorize(signature="(3)->(3,3)")
-    def one(angle):
-        return _axis_rotation(i, angle[0]) @ _axis_rotation(j, angle[1]) @ _axis_rotation(k, angle[2])
-
-    return one(angles)
-
-
-def euler_from_matrix(matrix: Float[Array, "*batch 3 3"], order: str) -> Float[Array, "*batch 3"]:
-    """Intrinsic Euler angles in radians; at gimbal lock the third angle is zero.
-
-    Args:
-        order: any of the twelve, such as ``"ZXY"`` or ``"XYX"``.
-    """
-    i, j, k = _axes(order)
-    proper = i == k
-    third = 3 - i - j if proper else k
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0
-
-    @_vectorize(signature="(3,3)->(3)")
-    def one(m):
-        if proper:
-            across = safe_norm(jnp.stack([m[i, j], m[i, third]]))
-            middle = jnp.arctan2(across, m[i, i])
-            first = jnp.arctan2(m[j, i], -sign * m[third, i])
-        else:
-            across = safe_norm(jnp.stack([m[i, i], m[i, j]]))
-            middle = jnp.arctan2(sign * m[i, k], across)
-            first = jnp.arctan2(-sign * m[j, k], m[k, k])
-        locked = across < 10 * jnp.finfo(m.dtype).eps
-        first = jnp.where(locked, jnp.arctan2(sign * m[third, j], m[j, j]), first)
-        # The last angle from R_first^T R = R_second R_third, whose row j is that of R_third. Near gimbal lock, where
-        # the first angle is uncertain, the last then makes up for it.
-        cosine, sine = jnp.cos(first), sign * jnp.sin(first)
-        row = cosine * m[j] + sine * m[third]
-        last = jnp.arctan2(-sign * row[third], row[j]) if proper else jnp.arctan2(sign * row[i], row[j])
-        last = jnp.where(locked, 0.0, last)
-        return jnp.stack([first, middle, last])
-
-    return one(matrix)
 
 
 @_vectorize(signature="(3,3),(3,3)->()")

@@ -1,4 +1,4 @@
-"""The joint tree that a motion moves."""
+"""Skeletons: joint trees with fixed bone lengths."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -50,17 +50,17 @@ class Skeleton:
     offsets: Float[Array | np.ndarray, "J 3"]
     """Position of each joint in its parent's frame at rest, in metres.
 
-    Row 0 (the root) is not used by forward kinematics: a motion carries the root's position.
+    Row 0 (the root) is not used by forward kinematics: the root's position is part of a motion.
     """
     names: tuple[str, ...]
     """One unique name a joint; static."""
     parents: tuple[int, ...]
     """Index of each joint's parent, -1 for the root; a parent comes before its children; static."""
     ends: tuple[tuple[int, tuple[float, float, float]], ...] = field(default=())
-    """BVH end sites: (joint, offset in that joint's frame in metres); drawn and written, never moved; static."""
+    """BVH end sites: (joint, offset in that joint's frame in metres); drawn and written, without rotation; static."""
 
     def __post_init__(self) -> None:
-        # Under tracing and tree transformations leaves may be any object, so only static fields are checked.
+        # Leaves may be any object under tracing and tree transformations, so only static fields are checked.
         count = len(self.names)
         if len(self.parents) != count:
             raise ValueError(f"Expected one parent a joint; got {len(self.parents)} parents for {count} names.")
@@ -82,11 +82,11 @@ class Skeleton:
 
     @cached_property
     def levels(self) -> tuple[tuple[int, ...], ...]:
-        """Joints by depth: level 0 is the root; the parents of level n lie in level n - 1."""
+        """Joints by depth: level 0 is the root; the parents of level n are in level n - 1."""
         return tree_levels(self.parents)
 
     def index(self, name: str) -> int:
-        """Index of the joint called ``name``; ``KeyError`` names the joints there are."""
+        """Index of the joint called ``name``; otherwise a ``KeyError`` that lists the joints."""
         try:
             return self.names.index(name)
         except ValueError:

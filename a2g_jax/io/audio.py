@@ -24,12 +24,12 @@ _UNKNOWN_LENGTH = 2**63 - 1
 
 @dataclass(frozen=True)
 class AudioInfo:
-    """What an audio file says about itself."""
+    """Properties of an audio file."""
 
     sample_rate: int
     channels: int
     frames: int
-    """Samples a channel."""
+    """Samples per channel."""
     format: str
     """Container, such as ``"WAV"``."""
     subtype: str
@@ -42,10 +42,10 @@ class AudioInfo:
 
 
 def audio_info(path: str | os.PathLike[str]) -> AudioInfo:
-    """Sample rate, channels and length of an audio file, from its header.
+    """Properties of an audio file, from its header.
 
     Raises:
-        InputError: no such file, or no audio file.
+        InputError: no such file, or not an audio file.
     """
     path = check_readable(path, "an audio file")
     with _open(path) as sound:
@@ -55,7 +55,7 @@ def audio_info(path: str | os.PathLike[str]) -> AudioInfo:
 def read_audio(
     path: str | os.PathLike[str], sample_rate: int = 16000, *, max_seconds: float = 4 * 3600.0
 ) -> Float[np.ndarray, " N"]:
-    """Read speech: mono float32 samples at ``sample_rate``.
+    """Read audio as mono float32 samples at ``sample_rate``.
 
     Reads what libsndfile reads: WAV of any width, FLAC, OGG, MP3, AIFF and more, at any rate. Channels are averaged,
     other rates resampled (soxr, high quality) to ``round(frames * sample_rate / rate)`` samples.
@@ -76,7 +76,7 @@ def read_audio(
     samples, rate = _read_mono(path, max_seconds)
     if rate == sample_rate:
         return samples
-    import soxr  # takes a while to load, and many files need none of it
+    import soxr  # slow to load, and files at the right rate do not need it
 
     length = max(1, round(len(samples) * sample_rate / rate))
     result = np.asarray(soxr.resample(samples, rate, sample_rate, quality="HQ"), np.float32)[:length]
@@ -86,14 +86,14 @@ def read_audio(
 def write_audio(
     path: str | os.PathLike[str], samples: Float[np.ndarray, " N"], sample_rate: int, subtype: str | None = "PCM_16"
 ) -> None:
-    """Write mono samples in -1 to 1, atomically; integer formats clip what lies outside.
+    """Write mono samples in -1 to 1, atomically; integer formats clip values outside.
 
     Args:
-        path: its suffix names the format: ``.wav``, ``.flac``, ``.ogg`` ...
+        path: its suffix is the format: ``.wav``, ``.flac``, ``.ogg`` ...
         subtype: encoding, by libsndfile's names; None takes the format's default.
 
     Raises:
-        InputError: unknown format, or an encoding that it does not have; NaN or infinities; nothing to write.
+        InputError: unknown format, or an encoding that it does not have; NaN or infinities; no samples.
     """
     import soundfile
 
@@ -101,18 +101,18 @@ def write_audio(
     if sample_rate <= 0:
         raise ValueError(f"Expected a positive sample rate; got {sample_rate}.")
     if len(samples) == 0:
-        raise InputError(f"{path}: not written: there are no samples.")
+        raise InputError(f"{path}: not written: there are no samples; record or export the audio again.")
     if not np.all(np.isfinite(samples)):
         at = int(np.argmax(~np.isfinite(samples)))
         raise InputError(f"{path}: not written: NaN or infinity at {at / sample_rate:.3f} s.")
     format = path.suffix[1:].upper()
     if format not in soundfile.available_formats() or format == "RAW":
-        raise InputError(f"{path}: not written: {path.suffix!r} is no audio format; use .wav or .flac.")
+        raise InputError(f"{path}: not written: {path.suffix!r} is not an audio format; use .wav or .flac.")
     if subtype is None:
         subtype = soundfile.default_subtype(format)
     if not soundfile.check_format(format, subtype):
-        known = ", ".join(soundfile.available_subtypes(format))
-        raise InputError(f"{path}: not written: {format} has no encoding {subtype}; it has {known}.")
+        encodings = ", ".join(soundfile.available_subtypes(format))
+        raise InputError(f"{path}: not written: {format} has no encoding {subtype}; it has {encodings}.")
     with atomic_path(path) as temporary:
         try:
             soundfile.write(str(temporary), samples, sample_rate, subtype=subtype, format=format)
@@ -123,9 +123,9 @@ def write_audio(
 def _open(path: Path) -> Any:
     import soundfile
 
-    # soundfile takes this suffix for headerless samples, whatever the content.
+    # soundfile reads files of this suffix as headerless samples, whatever their content.
     if path.suffix.lower() == ".raw":
-        raise InputError(f"{path}: raw samples have no header that says their rate; convert the file to WAV.")
+        raise InputError(f"{path}: raw samples have no header with their rate; convert the file to WAV.")
     try:
         return soundfile.SoundFile(str(path))
     except (soundfile.LibsndfileError, UnicodeError) as error:
@@ -154,7 +154,7 @@ def _reason(error: Exception) -> str:
 
 
 def _read_mono(path: Path, max_seconds: float) -> tuple[Float[np.ndarray, " N"], int]:
-    # In blocks: a header may claim more samples than the memory holds.
+    # In blocks: a header may claim more samples than fit into memory.
     import soundfile
 
     with _open(path) as sound:
@@ -179,14 +179,14 @@ def _read_mono(path: Path, max_seconds: float) -> tuple[Float[np.ndarray, " N"],
             finite = np.isfinite(block).all(axis=1)
             if not finite.all():
                 at = (count + int(np.argmin(finite))) / rate
-                raise InputError(f"{path}: holds NaN or infinity at {at:.3f} s; export it again.")
+                raise InputError(f"{path}: contains NaN or infinity at {at:.3f} s; export it again.")
             count += len(block)
             if count > longest:
                 _refuse_length(path, count / rate, max_seconds)
             peak = max(peak, float(np.max(np.abs(block))))
             blocks.append(block.mean(axis=1, dtype=np.float64).astype(np.float32))
     if count == 0:
-        raise InputError(f"{path}: holds no samples; record or export it again.")
+        raise InputError(f"{path}: contains no samples; record or export it again.")
     if format in _EXACT and claimed != _UNKNOWN_LENGTH and count < claimed:
         raise InputError(
             f"{path}: is cut short: the header says {claimed / rate:.2f} s and {count / rate:.2f} s can be read; "

@@ -7,10 +7,10 @@ from typing import NoReturn
 
 from a2g_jax.errors import InputError
 
-#: Bounds on what is read and written, so that a broken or hostile file costs a message and not the memory.
+#: Bounds on what is read and written: a broken or hostile file costs an error message, not memory.
 MAX_DEPTH = 512
 MAX_JOINTS = 4096
-#: Largest length or angle (in the file's units) that counts as one.
+#: Largest length or angle (in the file's units) that is accepted.
 MAX_VALUE = 1e9
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
@@ -32,18 +32,29 @@ class Joint:
     ends: list[tuple[float, float, float]] = field(default_factory=list)
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Layout of a BVH file: what a writer needs to write another motion in the same way."""
+
+    head: str
+    """The text before ``MOTION``."""
+    joints: list[Joint]
+    scale: float
+    """Metres in one unit of the file."""
+
+
 def fail(path: object, line: int, message: str) -> NoReturn:
-    """Raise the error of one line of a file."""
+    """Raise an ``InputError`` for a line of a file."""
     raise InputError(f"{path}, line {line}: {message}")
 
 
 def shown(token: str) -> str:
-    """A piece of the file for a message: quoted, on one line, not too long."""
+    """A token of the file for a message: quoted, on one line, shortened."""
     return repr(token if len(token) <= 40 else token[:37] + "...")
 
 
 def parse_number(token: str) -> float | None:
-    """The number that ``token`` spells in plain ASCII, or None; Python's own extras (``1_000``, ``nan``) are none."""
+    """The number written as ``token`` in plain ASCII, or None, also for Python's own forms (``1_000``, ``nan``)."""
     return float(token) if _NUMBER.fullmatch(token) else None
 
 
@@ -54,7 +65,7 @@ def parse_hierarchy(path: object, text: str) -> list[Joint]:
         The joints in file order, parents first; joint 0 is the root.
 
     Raises:
-        InputError: the line that is wrong, and how.
+        InputError: an error in a line; the message names it.
     """
     parser = _Parser(path, text)
     parser.file()
@@ -62,7 +73,7 @@ def parse_hierarchy(path: object, text: str) -> list[Joint]:
 
 
 class _Parser:
-    # A loop with an explicit stack, since a file may nest deeper than Python's call stack allows.
+    # A loop with an explicit stack: a file may nest deeper than Python's call stack.
 
     def __init__(self, path: object, text: str) -> None:
         self.path = path
@@ -82,7 +93,7 @@ class _Parser:
         return self.ahead
 
     def next(self) -> str:
-        """Take the next token that is not a line break, "" at the end."""
+        """Consume and return the next token that is not a line break, "" at the end."""
         while True:
             token = self.peek()
             self.ahead = None if token else ""
@@ -151,7 +162,7 @@ class _Parser:
             fail(
                 self.path,
                 line,
-                f"a joint named {shown(name)} stands in line {self.lines[name]} already; rename one of them.",
+                f"a joint named {shown(name)} is in line {self.lines[name]} already; rename one of them.",
             )
         self.lines[name] = line
         self.joints.append(Joint(name, parent, line))
@@ -201,7 +212,7 @@ class _Parser:
                     f"which is none of {', '.join(CHANNELS)}."
                 )
             if channel in found:
-                self.fail(f"channel {channel} stands twice in joint {shown(joint.name)}; remove one.")
+                self.fail(f"channel {channel} occurs twice in joint {shown(joint.name)}; remove one.")
             found.append(channel)
         return tuple(found)
 

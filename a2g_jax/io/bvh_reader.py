@@ -1,7 +1,7 @@
 """Read BVH files.
 
-BVH (Biovision hierarchy) has no standard; this reads what capture systems, Blender, MotionBuilder, Maya and the
-research data sets write. The rotation channels of a joint multiply from left to right in the order of the file:
+BVH (Biovision hierarchy) has no standard; this module reads the files of capture systems, Blender, MotionBuilder, Maya
+and research data sets. The rotation channels of a joint multiply from left to right in the order of the file:
 ``Zrotation Xrotation Yrotation`` means ``R = Rz @ Rx @ Ry``, in degrees.
 """
 
@@ -13,16 +13,17 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.euler import euler_matrices
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh_hierarchy import MAX_VALUE, Joint, fail, parse_hierarchy, parse_number, shown
+from a2g_jax.io.bvh_hierarchy import MAX_VALUE, Joint, Layout, fail, parse_hierarchy, parse_number, shown
 from a2g_jax.io.files import check_readable
 from a2g_jax.io.frame_rate import rate_from_frame_time
 
 #: A skeleton larger than this at rest is in centimetres.
 _LARGEST_BODY = 10.0
 
-# Possessive, so that a line of a million spaces takes a million steps and not their square.
+# Possessive quantifiers: linear time on long lines of spaces.
 _FRAMES = re.compile(r"Frames?\s*+:?\s*+(\S++)$", re.IGNORECASE)
 _FRAME_TIME = re.compile(r"Frame\s*+Time\s*+:?\s*+(\S++)$", re.IGNORECASE)
 
@@ -34,21 +35,25 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     the world (in place of its OFFSET); a coordinate without a channel comes from OFFSET. Position channels of
     another joint are its bone: a motion has fixed bone lengths, so their mean over time is used as its offset.
 
-    The frame rate is the usual rate that the file's rounded frame time stands for
-    (:func:`~a2g_jax.io.frame_rate.rate_from_frame_time`). The number of frames in the header is checked against the
-    lines there are.
+    The frame rate is the usual rate nearest to the file's rounded frame time
+    (:func:`~a2g_jax.io.frame_rate.rate_from_frame_time`). The number of frames in the header must be that of the lines.
 
     Args:
         path: the file.
-        scale: metres in one unit of the file. None guesses: a skeleton that is larger than 10 units at rest, along
-            any axis, is in centimetres (0.01), any other in metres (1).
+        scale: metres in one unit of the file. None guesses: centimetres (0.01) for a skeleton larger than 10 units at
+            rest along any axis, otherwise metres (1).
 
     Returns:
         Float32 motion in metres, joints in file order.
 
     Raises:
-        InputError: the file is no BVH file or is damaged; the message names the line.
+        InputError: the file is not a BVH file or is damaged; the message names the line.
     """
+    return read_with_layout(path, scale=scale)[0]
+
+
+def read_with_layout(path: str | os.PathLike[str], *, scale: float | None = None) -> tuple[Motion, Layout]:
+    """A motion and the layout of its file; arguments and errors of :func:`read_bvh`."""
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise ValueError(f"Expected a positive scale, in metres a unit; got {scale}.")
     path = check_readable(path, "a BVH file")
@@ -61,11 +66,12 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")  # only names hold letters, and any name will do
+        text = data.decode("latin-1")  # letters occur in names only, and any name is valid
     text = text.replace("\r\n", "\n").replace("\r", "\n")
 
     start = re.search(r"^[ \t]*MOTION[ \t]*$", text, re.IGNORECASE | re.MULTILINE)
-    joints = parse_hierarchy(path, text[: start.start()] if start else text[:4_000_000])
+    head = text[: start.start()] if start else text[:4_000_000]
+    joints = parse_hierarchy(path, head)
     if start is None:
         fail(path, text.count("\n") + 1, "the file ends without a MOTION section; is it cut short?")
     line = text.count("\n", 0, start.start()) + 1
@@ -74,11 +80,17 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
     if channels == 0:
         fail(path, joints[0].line, "no joint has a channel, so nothing moves; add CHANNELS.")
     values = _motion_values(path, lines, first, frames, channels)
-    return _motion(joints, values, rate_from_frame_time(frame_time), scale)
+    offsets, rotations, root = _poses(joints, values)
+    if scale is None:
+        scale = 0.01 if _extent(joints, offsets) > _LARGEST_BODY else 1.0
+    skeleton = _skeleton(joints, offsets, scale)
+    fps = rate_from_frame_time(frame_time)
+    motion = Motion(rotations=rotations, root=(root * scale).astype(np.float32), skeleton=skeleton, fps=fps)
+    return motion, Layout(head, joints, scale)
 
 
 def _motion_header(path: object, lines: list[str], line: int) -> tuple[int, str, list[str], int]:
-    # lines[0] is what follows MOTION in its line, which is number ``line``.
+    # lines[0] is the rest of the line of MOTION, which is number ``line``.
     at = _next_filled(lines, 0)
     found = _FRAMES.match(lines[at].strip())
     if not found:
@@ -101,7 +113,7 @@ def _motion_header(path: object, lines: list[str], line: int) -> tuple[int, str,
 
 
 def _next_filled(lines: list[str], at: int) -> int:
-    # The last line if none is filled.
+    # The index of the next line with content, or of the last line.
     while at < len(lines) - 1 and not lines[at].strip():
         at += 1
     return min(at, len(lines) - 1)
@@ -112,7 +124,7 @@ def _at(lines: list[str], at: int) -> str:
 
 
 def _motion_values(path: object, lines: list[str], first: int, frames: int, channels: int) -> Float[np.ndarray, "T C"]:
-    # The whole block at once; only when that fails, line by line to find the place.
+    # The whole block at once; line by line only to locate an error.
     if not any(line.strip() for line in lines):
         fail(path, first, f"expected {frames} frames after the frame time; got the end of the file.")
     try:
@@ -126,7 +138,7 @@ def _motion_values(path: object, lines: list[str], first: int, frames: int, chan
     if len(values) != frames:
         filled = [at for at, line in enumerate(lines) if line.strip()]
         what = "is the file cut short?" if len(values) < frames else "correct the header or remove the rest."
-        fail(path, first + filled[-1], f"the header says {frames} frames and the file holds {len(values)}; {what}")
+        fail(path, first + filled[-1], f"the header says {frames} frames and the file has {len(values)}; {what}")
     return values
 
 
@@ -147,7 +159,10 @@ def _find_fault(path: object, lines: list[str], first: int, channels: int) -> No
     raise InputError(f"{path}: the frames cannot be read as numbers; is the file damaged?")
 
 
-def _motion(joints: list[Joint], values: Float[np.ndarray, "T C"], fps: float, scale: float | None) -> Motion:
+def _poses(
+    joints: list[Joint], values: Float[np.ndarray, "T C"]
+) -> tuple[Float[np.ndarray, "J 3"], Float[np.ndarray, "T J 3 3"], Float[np.ndarray, "T 3"]]:
+    """Offsets, rotations and root path, in the unit of the file."""
     offsets = np.array([joint.offset for joint in joints], np.float64)
     root = np.tile(offsets[0], (len(values), 1))
     angles: dict[str, list[tuple[int, list[int]]]] = {}
@@ -171,19 +186,19 @@ def _motion(joints: list[Joint], values: Float[np.ndarray, "T C"], fps: float, s
     for order, members in angles.items():
         indices = [index for index, _ in members]
         rotations[:, indices] = euler_matrices(values[:, [columns for _, columns in members]], order)
+    return offsets, rotations, root
 
-    if scale is None:
-        scale = 0.01 if _extent(joints, offsets) > _LARGEST_BODY else 1.0
+
+def _skeleton(joints: list[Joint], offsets: Float[np.ndarray, "J 3"], scale: float) -> Skeleton:
     ends = tuple(
         (index, (x * scale, y * scale, z * scale)) for index, joint in enumerate(joints) for x, y, z in joint.ends
     )
-    skeleton = Skeleton(
+    return Skeleton(
         offsets=(offsets * scale).astype(np.float32),
         names=tuple(joint.name for joint in joints),
         parents=tuple(joint.parent for joint in joints),
         ends=ends,
     )
-    return Motion(rotations=rotations, root=(root * scale).astype(np.float32), skeleton=skeleton, fps=fps)
 
 
 def _extent(joints: list[Joint], offsets: Float[np.ndarray, "J 3"]) -> float:
@@ -194,17 +209,3 @@ def _extent(joints: list[Joint], offsets: Float[np.ndarray, "J 3"]) -> float:
     tips = [places[index] + end for index, joint in enumerate(joints) for end in joint.ends]
     points = np.concatenate([places, np.reshape(tips, (-1, 3))])
     return float(np.max(points.max(axis=0) - points.min(axis=0)))
-
-
-def euler_matrices(degrees: Float[np.ndarray, "*batch A"], order: str) -> Float[np.ndarray, "*batch 3 3"]:
-    """Rotation matrices of one to three intrinsic Euler angles: ``"ZXY"`` is ``Rz @ Rx @ Ry``."""
-    angles = np.radians(degrees)
-    cosines, sines = np.cos(angles)[..., None], np.sin(angles)[..., None]
-    matrices = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3)).copy()
-    for at, axis in enumerate(order):
-        # Multiplying by a rotation about one axis from the right mixes the two columns of the others.
-        i, j = ("XYZ".index(axis) + 1) % 3, ("XYZ".index(axis) + 2) % 3
-        cosine, sine = cosines[..., at, :], sines[..., at, :]
-        left, right = matrices[..., i], matrices[..., j]
-        matrices[..., i], matrices[..., j] = left * cosine + right * sine, right * cosine - left * sine
-    return matrices

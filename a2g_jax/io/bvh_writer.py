@@ -3,66 +3,121 @@
 import math
 import os
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.euler import continuous_euler, euler_matrices
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS
-from a2g_jax.io.euler import continuous_euler
+from a2g_jax.io.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, Layout
 from a2g_jax.io.files import atomic_path
 
-#: Length in metres of the End Site of a leaf joint that has none.
+#: Length in metres of the End Site added to a leaf joint without one.
 _TIP = 0.05
+#: Decimals of an angle in degrees.
+_ANGLE_DECIMALS = 6
+#: Largest error in degrees of rotation channels that is not reported.
+_CLOSE = 0.1
 
 
 def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY", scale: float = 100.0) -> None:
     """Write a motion as BVH: six channels for the root, three for every other joint.
 
-    Angles run on without jumps of 360 degrees from frame to frame, so that editors interpolate them well. Numbers
-    are fixed-point: lengths to 10 nanometres or better, angles to a millionth of a degree. Spaces and braces in joint
-    names become underscores, and leaf joints without an end get an End Site of 5 cm along their bone.
+    Angles have no jumps of 360 degrees between frames, so that editors interpolate them well. Numbers are fixed-point:
+    lengths to 10 nanometres or better, angles to a millionth of a degree. Spaces and braces in joint names become
+    underscores, and leaf joints without an end get an End Site of 5 cm along their bone.
 
-    BVH nests its joints, so a reader gets them in depth-first order: compare with the original by name.
+    Joints of BVH files are in depth-first order: compare them with the original by name.
 
     Args:
-        path: written atomically; missing folders are made.
+        path: written atomically; missing folders are created.
         order: the rotation channels, a permutation of ``XYZ``.
-        scale: units of the file in a metre: 100 writes centimetres.
+        scale: units of the file per metre: 100 writes centimetres.
 
     Raises:
         ValueError: an unknown order or scale.
-        InputError: the motion has no frames or holds NaN or infinities, or the file cannot be written.
+        InputError: the motion has no frames, NaN or infinities, or the file cannot be written.
     """
     if sorted(order) != ["X", "Y", "Z"]:
         raise ValueError(f"Expected the rotation order as a permutation of XYZ; got {order!r}.")
     if not (math.isfinite(scale) and scale > 0):
         raise ValueError(f"Expected a positive scale, in units a metre; got {scale}.")
+    rotations, root = _checked(path, motion)
     skeleton = motion.skeleton
-    rotations = np.asarray(motion.rotations, np.float64)
-    root = np.asarray(motion.root, np.float64)
-    _check(path, motion, rotations, root)
-
     walk = _depth_first(skeleton)
-    places = max(6, 8 - math.floor(math.log10(scale)))
+    decimals = max(6, 8 - math.floor(math.log10(scale)))
     angles = continuous_euler(rotations[:, walk], order)
     values = np.concatenate([root * scale, angles.reshape(len(angles), -1)], axis=1)
-    # Rounding here, and adding zero, keeps "-0.000000" out of the file.
-    values[:, :3] = np.round(values[:, :3], places) + 0.0
-    values[:, 3:] = np.round(values[:, 3:], 6) + 0.0
-    row = " ".join([f"%.{places}f"] * 3 + ["%.6f"] * (values.shape[1] - 3)) + "\n"
+    head = "\n".join(_hierarchy(skeleton, walk, order, scale, decimals))
+    _write(path, head, values, [decimals] * 3 + [_ANGLE_DECIMALS] * (values.shape[1] - 3), motion.fps)
+
+
+def write_like(path: str | os.PathLike[str], motion: Motion, layout: Layout) -> dict[str, float]:
+    """Write a motion in the layout of the file that its skeleton was read from: names, channels, orders and unit.
+
+    Angles have no jumps, as in :func:`write_bvh`. Joints with fewer than three rotation channels are approximated.
+
+    Args:
+        path: written atomically; missing folders are created.
+        layout: of a file with the joints of the motion, as :func:`~a2g_jax.io.bvh.read_with_layout` gives it.
+
+    Returns:
+        Largest error in degrees by joint, of the joints whose channels miss a rotation by more than 0.1 degrees.
+
+    Raises:
+        InputError: the motion has no frames, NaN or infinities, or the file cannot be written.
+    """
+    rotations, root = _checked(path, motion)
+    offsets = np.asarray(motion.skeleton.offsets, np.float64) / layout.scale
+    root = root / layout.scale
+    columns: list[Float[np.ndarray, " T"]] = []
+    errors: dict[str, float] = {}
+    for index, joint in enumerate(layout.joints):
+        channels = joint.channels or ()
+        order = "".join(channel[0] for channel in channels if channel.endswith("rotation"))
+        angles, error = _angles(rotations[:, index], order)
+        if error > _CLOSE:
+            errors[joint.name] = error
+        for channel in channels:
+            axis = "XYZ".index(channel[0])
+            if channel.endswith("rotation"):
+                columns.append(angles[:, order.index(channel[0])])
+            else:
+                columns.append(root[:, axis] if index == 0 else np.full(motion.frames, offsets[index, axis]))
+    _write(path, layout.head.rstrip(), np.stack(columns, axis=1), [_ANGLE_DECIMALS] * len(columns), motion.fps)
+    return errors
+
+
+def _angles(rotations: Float[np.ndarray, "T 3 3"], order: str) -> tuple[Float[np.ndarray, "T A"], float]:
+    """Angles in degrees for up to three rotation channels, and by how many degrees they miss the rotations."""
+    whole = order + "".join(axis for axis in "XYZ" if axis not in order)
+    angles = continuous_euler(rotations[:, None], whole)[:, 0, : len(order)]
+    written = euler_matrices(angles, order) if order else np.broadcast_to(np.eye(3), rotations.shape)
+    return angles, float(rotation_angle(written, rotations).max(initial=0.0))
+
+
+def _write(
+    path: str | os.PathLike[str], head: str, values: Float[np.ndarray, "T C"], decimals: Sequence[int], fps: float
+) -> None:
+    """Write the text before ``MOTION`` and the frames, a number of decimals for each column."""
+    places = np.array(decimals)
+    for count in np.unique(places).tolist():
+        # Rounding here, and adding zero, keeps "-0.000000" out of the file.
+        values[:, places == count] = np.round(values[:, places == count], count) + 0.0
+    row = " ".join(f"%.{count}f" for count in decimals) + "\n"
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write("\n".join(_hierarchy(skeleton, walk, order, scale, places)) + "\n")
-        file.write(f"MOTION\nFrames: {motion.frames}\nFrame Time: {1 / motion.fps:.10f}\n")
+        file.write(f"{head}\nMOTION\nFrames: {len(values)}\nFrame Time: {1 / fps:.10f}\n")
         file.writelines(row % tuple(frame) for frame in values.tolist())
 
 
-def _check(
-    path: object, motion: Motion, rotations: Float[np.ndarray, "T J 3 3"], root: Float[np.ndarray, "T 3"]
-) -> None:
+def _checked(path: object, motion: Motion) -> tuple[Float[np.ndarray, "T J 3 3"], Float[np.ndarray, "T 3"]]:
+    """Rotations and root in double precision, or ``InputError`` for a motion that cannot be written."""
     skeleton = motion.skeleton
+    rotations, root = np.asarray(motion.rotations, np.float64), np.asarray(motion.root, np.float64)
     if motion.frames == 0:
         raise InputError(f"{path}: not written: the motion has no frames.")
     if rotations.shape[1] != skeleton.joints or len(root) != len(rotations):
@@ -79,6 +134,7 @@ def _check(
         if len(bad):
             place = "joint" if what == "offsets" else "frame"
             raise InputError(f"{path}: not written: NaN or infinity in the {what} of {place} {bad[0][0]}.")
+    return rotations, root
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
@@ -131,21 +187,21 @@ def _hierarchy(skeleton: Skeleton, walk: list[int], order: str, scale: float, pl
 
 
 def _tip(bone: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
-    # A leaf's own frame is parallel to its parent's at rest, so the bone's direction holds in it.
+    # At rest a leaf's frame is parallel to its parent's, so the bone's direction is the same in both.
     length = float(np.linalg.norm(bone))
     x, y, z = (bone / length * _TIP).tolist() if length > 1e-9 else (0.0, _TIP, 0.0)
     return x, y, z
 
 
 def _file_names(names: tuple[str, ...]) -> list[str]:
-    taken: set[str] = set()
+    used: set[str] = set()
     result = []
     for name in names:
         plain = unique = re.sub(r"[\s{}\0]", "_", name.strip()) or "joint"
         number = 2
-        while unique in taken:
+        while unique in used:
             unique = f"{plain}_{number}"
             number += 1
-        taken.add(unique)
+        used.add(unique)
         result.append(unique)
     return result

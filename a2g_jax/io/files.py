@@ -1,4 +1,4 @@
-"""Reading and writing files safely: errors in one line, and nothing half-written."""
+"""Reading and writing files safely: one-line errors and atomic writes."""
 
 import hashlib
 import json
@@ -16,13 +16,13 @@ from a2g_jax.errors import InputError
 
 
 def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
-    """The path of an ordinary file with something in it.
+    """The path, checked to be a readable, ordinary, non-empty file.
 
     Args:
         kind: what the file should be, with its article, for the messages: ``"a BVH file"``.
 
     Raises:
-        InputError: there is no such file, it may not be read, it is a folder or a device, or it is empty.
+        InputError: no such file, no permission to read it, a folder or a device, or an empty file.
     """
     path = Path(path)
     try:
@@ -50,14 +50,14 @@ def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Write a file completely or not at all.
 
-    Yields a temporary path in the same folder with the same suffix. When the block ends well, that file takes the
-    place of ``path``; when it raises, it is removed and ``path`` stays as it was. Missing folders are made.
+    Yields a temporary path in the same folder with the same suffix. When the block succeeds, that file replaces
+    ``path``; when it raises, it is removed and ``path`` stays unchanged. Missing folders are created.
 
     Raises:
-        InputError: the folder cannot be made or written to, or ``path`` is a folder or a device.
+        InputError: the folder cannot be created or written to, or ``path`` is a folder or a device.
     """
     path = Path(path)
-    # A link is followed, so that the file it points at is replaced and not the link.
+    # Links are followed: the file is replaced, not the link.
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise InputError(f"{path}: is a folder; name a file in it.")
@@ -81,10 +81,10 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
-    """Make a folder, and those above it, unless it is there.
+    """Create a folder and its parents unless they exist.
 
     Raises:
-        InputError: a file stands in the way, or the folder cannot be made or written to.
+        InputError: the path is a file, or the folder cannot be created or written to.
     """
     path = Path(path)
     try:
@@ -112,8 +112,8 @@ def sha256_file(path: str | os.PathLike[str]) -> str:
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
     """Write ``value`` as indented UTF-8 JSON, atomically.
 
-    NumPy scalars and arrays and paths are written as what they hold; NaN and infinities raise ``ValueError``, because
-    JSON has none.
+    NumPy scalars, arrays and paths become numbers, lists and text; NaN and infinities, which JSON lacks, raise
+    ``ValueError``.
     """
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
     with atomic_path(path) as temporary:
@@ -127,20 +127,19 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    raise TypeError(f"Expected a value that JSON can hold; got {type(value).__name__}.")
+    raise TypeError(f"Expected a value that JSON can represent; got {type(value).__name__}.")
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
     """Read a JSON file.
 
     Raises:
-        InputError: no such file, not UTF-8, or not JSON (with the line and column); NaN and infinities count as
-            broken.
+        InputError: no such file, not UTF-8, or not JSON (with the line and column), as with NaN and infinities.
     """
     path = check_readable(path, "a JSON file")
 
     def refuse(name: str) -> None:
-        raise InputError(f"{path}: holds {name}, which is not JSON; replace it by null or a number.")
+        raise InputError(f"{path}: contains {name}, which is not JSON; replace it by null or a number.")
 
     try:
         return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=refuse)

@@ -1,19 +1,18 @@
-"""The frame rate that a printed frame time stands for."""
+"""Frame rates from rounded frame times."""
 
 import math
 import re
 
-#: Rates that cameras and capture systems run at. The whole numbers come first: where a short number fits both 24 and
-#: 23.976, it means 24.
+#: Rates of cameras and capture systems. Whole numbers come first: a short number that fits 24 and 23.976 means 24.
 _USUAL = (15, 20, 24, 25, 30, 48, 50, 60, 90, 100, 120, 240, *(rate * 1000 / 1001 for rate in (24, 30, 60, 120)))
 
 
 def rate_from_frame_time(printed: str) -> float:
-    """Frames a second, from the seconds between frames as a file prints them.
+    """Frames per second, from the seconds between frames as printed in a file.
 
-    A frame time is a rounded number, and its error adds up: 0.0333 read as 30.03 fps drifts from the speech by 60 ms
-    a minute. The rate is therefore the usual one (or the whole number) that prints as the same digits, or that lies
-    within one part in ten thousand; else it is 1 / frame time.
+    A frame time is a rounded number, and its error accumulates: 0.0333 read as 30.03 fps drifts from the speech by
+    60 ms per minute. So the rate is the usual one (or the whole number) whose frame time prints as the same digits, or
+    that differs by less than one part in ten thousand; otherwise it is 1 / frame time.
 
     Args:
         printed: a positive, finite decimal number such as ``0.033333`` or ``8.333e-03``.
@@ -37,7 +36,7 @@ def rate_from_frame_time(printed: str) -> float:
 
 
 def _precision(printed: str) -> tuple[int, int]:
-    # Significant digits, and decimals behind the point.
+    # Significant digits, and digits after the decimal point.
     mantissa, _, exponent = printed.lower().partition("e")
     figures = re.sub(r"[^0-9]", "", mantissa).lstrip("0")
     decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
@@ -45,7 +44,7 @@ def _precision(printed: str) -> tuple[int, int]:
 
 
 def _prints_as(exact: float, seconds: float, digits: int, decimals: int) -> bool:
-    # One digit says too little, and two do where the writer cut digits off instead of rounding.
+    # One digit is too little evidence, and so are two where the writer truncated instead of rounding.
     unit = 10.0**-decimals
     if digits < 2:
         return False

@@ -1,10 +1,10 @@
-"""Arrays in HDF5 files, as PATS comes in; needs the optional package h5py.
+"""Arrays in HDF5 files, the format of PATS; needs the optional package h5py.
 
-HDF5 files can name other files (external links, external storage, virtual data sets) and filters that the library
-loads as code. All of these are refused here before anything is read, as are sizes beyond the limits. What remains is
-the C library's own reading of the file's structure, which no Python check replaces: changed bytes can make it crash
-the process (2 of 4 trials with 700 damaged files each did, h5py 3.16). So take files from where you would take a
-program from; the rest of this package's readers ask no such trust.
+HDF5 files can refer to other files (external links, external storage, virtual data sets) and to filters that the
+library loads as code. All of these are refused here before anything is read, as are sizes beyond the limits. But the C
+library parses the file's structure without a check from Python, and changed bytes can crash the process (in 2 of 4
+trials with 700 damaged files each, h5py 3.16). So read HDF5 files only from sources whose programs you would run; the
+other readers of this package need no such trust.
 """
 
 import math
@@ -20,31 +20,31 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable
 from a2g_jax.io.untrusted.budget import CONVERT, Budget, Limits, clip
 
-#: Numbers of the filters that are read: deflate, shuffle, Fletcher's checksum, and h5py's LZF.
+#: Numbers of the allowed filters: deflate, shuffle, Fletcher's checksum, and h5py's LZF.
 _FILTERS = frozenset({1, 2, 3, 32000})
-#: Bytes that the library's notes on one chunk count for.
+#: Bytes charged for the library's bookkeeping of one chunk.
 _CHUNK = 512
 _MOST_SHOWN = 8
-# What h5py makes of the errors of the C library.
+# Exceptions of h5py for errors of the C library.
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError)
 
 
 def read_hdf5(
     path: str | os.PathLike[str], names: Sequence[str], limits: Limits | None = None
 ) -> dict[str, np.ndarray]:
-    """Arrays of numbers, truth values or text in an HDF5 file.
+    """Arrays of numbers, booleans or text in an HDF5 file.
 
     Args:
         path: the file.
         names: paths of data sets in it, such as ``pose/data``.
-        limits: how much all of them may take.
+        limits: bounds on all of them together.
 
     Returns:
         The arrays by name; text (of fixed length only) as NumPy text.
 
     Raises:
-        InputError: h5py is missing; no such file, no HDF5 file, damaged, without a data set that is asked for, or one
-            that lies elsewhere, is of other types, is packed by other filters or goes beyond the limits.
+        InputError: h5py is missing; no such file, not an HDF5 file, damaged, or a data set that is missing, stored
+            elsewhere, of other types, packed by other filters or beyond the limits.
     """
     path = check_readable(path, "an HDF5 file")
     try:
@@ -71,7 +71,7 @@ def read_hdf5(
 
 
 def _find(h5py: Any, path: Path, file: Any, name: str) -> Any:
-    """The data set of a name, through groups of this file only."""
+    """The data set with this name, through groups of this file only."""
     place = file
     parts = [part for part in name.split("/") if part]
     for number, part in enumerate(parts):
@@ -97,7 +97,7 @@ def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.nd
 
     layout = found.id.get_create_plist()
     if layout.get_external_count() or layout.get_layout() == h5py.h5d.VIRTUAL:
-        raise refuse("lies in other files, which is refused")
+        raise refuse("is stored in other files, which is refused")
     filters = [layout.get_filter(index) for index in range(layout.get_nfilters())]
     codes = [code for code, *_ in filters]
     for code, _, _, label in filters:
@@ -106,7 +106,7 @@ def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.nd
     text = h5py.check_string_dtype(found.dtype)
     dtype, shape = found.dtype, found.shape
     if text is not None and text.length is None:
-        # A damaged heap, where such text lies, sends the C library round in circles for ever.
+        # A damaged heap, where such text is stored, sends the C library into an endless loop.
         raise refuse("is text of variable length, which is refused")
     if shape is None or not (text or (dtype.kind in "biuf" and dtype.itemsize <= 8)):
         raise refuse(f"is of type {clip(str(dtype))}; expected an array of plain numbers or text")
@@ -124,7 +124,7 @@ def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.nd
         return np.char.decode(array, "utf-8")
     array = np.array(array, dtype.newbyteorder("=").str, order="C")
     if dtype.kind == "b" and size and array.view(np.uint8).max() > 1:
-        raise ValueError("a truth value is neither 0 nor 1")
+        raise ValueError("a boolean is neither 0 nor 1")
     return array
 
 

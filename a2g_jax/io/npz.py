@@ -1,4 +1,4 @@
-"""Motions as NumPy archives: the form to read from Python without this package."""
+"""Motions as NumPy archives, readable in Python without this package."""
 
 import lzma
 import math
@@ -20,7 +20,7 @@ from a2g_jax.io.files import atomic_path, check_readable
 #: Largest array that is read, in bytes, and longest array header.
 _LARGEST = 8 * 2**30
 _LONGEST_HEADER = 65_536
-# What zipfile, its decompressors and numpy.lib.format raise on damaged bytes.
+# Exceptions of zipfile, its decompressors and numpy.lib.format for damaged bytes.
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, tokenize.TokenError, struct.error, ArithmeticError, EOFError,
     IndexError, KeyError, MemoryError, OSError, RuntimeError, SyntaxError, TypeError, ValueError,
@@ -36,16 +36,16 @@ def write_motion_npz(path: str | os.PathLike[str], motion: Motion) -> None:
     ``rotations``           (T, J, 3, 3)  local rotation matrices, parent from joint
     ``root``                (T, 3)        world position of joint 0, metres
     ``positions``           (T, J, 3)     world positions of all joints, metres; not read back
-    ``fps``                 ()            frames a second
+    ``fps``                 ()            frames per second
     ``joint_names``         (J,)          text
     ``parents``             (J,)          index of each joint's parent, -1 for the root
     ``offsets``             (J, 3)        bones at rest in the parent's frame, metres
-    ``end_joints``          (E,)          joints that carry an end site
+    ``end_joints``          (E,)          joints with an end site
     ``end_offsets``         (E, 3)        end sites in their joint's frame, metres
     ======================  ============  ==================================================
 
     Raises:
-        InputError: the suffix is another, or the motion holds NaN or infinities.
+        InputError: another suffix, or a motion with NaN or infinities.
     """
     path = Path(path)
     if path.suffix.lower() != ".npz":
@@ -70,7 +70,7 @@ def write_motion_npz(path: str | os.PathLike[str], motion: Motion) -> None:
 
 
 def read_motion_npz(path: str | os.PathLike[str]) -> Motion:
-    """Read what :func:`write_motion_npz` wrote; ``end_joints`` and ``end_offsets`` may be missing.
+    """Read an archive of :func:`write_motion_npz`; ``end_joints`` and ``end_offsets`` may be missing.
 
     Raises:
         InputError: no such file, not an archive, damaged, or an array is missing or of the wrong shape or type.
@@ -115,7 +115,7 @@ def _floats(
     path: Path, archive: zipfile.ZipFile, key: str, shape: tuple[int | None, ...], dtype: type = np.float32
 ) -> np.ndarray:
     array = _array(path, archive, key, "f", shape)
-    with np.errstate(over="ignore"):  # what float32 cannot hold is found below
+    with np.errstate(over="ignore"):  # values beyond float32 are found below
         array = array.astype(dtype)
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
@@ -125,7 +125,7 @@ def _floats(
 
 
 def _array(path: Path, archive: zipfile.ZipFile, key: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    # numpy.load would allocate whatever size an array's header claims, so the claim is checked first.
+    # numpy.load allocates the size that an array's header claims, so the claim is checked first.
     try:
         member = archive.getinfo(f"{key}.npy")
     except KeyError:
@@ -137,8 +137,8 @@ def _array(path: Path, archive: zipfile.ZipFile, key: str, kinds: str, shape: tu
             fits = 0 <= claimed <= _LARGEST and file.tell() + claimed == member.file_size
     except _DAMAGE as error:
         raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None
-    wanted = len(found) == len(shape) and all(w is None or w == f for w, f in zip(shape, found, strict=True))
-    if dtype.kind not in kinds or not wanted:
+    matches = len(found) == len(shape) and all(w is None or w == f for w, f in zip(shape, found, strict=True))
+    if dtype.kind not in kinds or not matches:
         sizes = ", ".join("any" if size is None else str(size) for size in shape)
         kind = {"f": "floating-point numbers", "U": "text", "iu": "integers", "fiu": "a number"}[kinds]
         raise InputError(f"{path}: {key}: expected {kind} of shape ({sizes}); got {dtype} of shape {tuple(found)}.")
@@ -158,7 +158,7 @@ def _header(file) -> tuple[tuple[int, ...], np.dtype]:
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file, max_header_size=_LONGEST_HEADER)
     if dtype.hasobject:
-        raise ValueError("it holds Python objects")
+        raise ValueError("it contains Python objects")
     return shape, dtype
 
 

@@ -1,14 +1,11 @@
-"""Whether a WAV file holds as many bytes as its header claims.
-
-libsndfile reads a file that was cut off in copying without a word, so this looks itself.
-"""
+"""Detection of truncated WAV files, which libsndfile reads without an error."""
 
 import struct
 from pathlib import Path
 
 from a2g_jax.errors import InputError
 
-#: Sizes that programs write which cannot know the length, because they write to a pipe.
+#: Placeholder sizes of programs that write to a pipe and cannot know the length.
 _STREAMED = (0xFFFFFFFF, 0x7FFFFFFF, 0x7FFFF000, 0)
 
 
@@ -24,7 +21,7 @@ def check_wav_length(path: Path) -> None:
         if head[8:] != b"WAVE":
             return
         long_size = None
-        # Each chunk is a name, a size and so many bytes, padded to an even number.
+        # Each chunk is a name, a size and as many bytes, padded to an even number.
         while len(chunk := file.read(8)) == 8:
             name, claimed = chunk[:4], struct.unpack("<I", chunk[4:])[0]
             start = file.tell()
@@ -37,7 +34,7 @@ def check_wav_length(path: Path) -> None:
                     return
                 if start + claimed > size:
                     raise InputError(
-                        f"{path}: is cut short: the header says {claimed} bytes of samples and the file holds "
+                        f"{path}: is cut short: the header says {claimed} bytes of samples and the file has "
                         f"{max(size - start, 0)}; copy or export it again."
                     )
                 return

@@ -1,8 +1,7 @@
 """Word timings in Praat's TextGrid files.
 
-Praat's text files are defined by what Praat ignores: only quoted strings, numbers that stand alone and ``<flags>``
-count, so that ``xmin = 0`` and ``0`` say the same, and the long and the short form are one grammar (Praat manual,
-"TextGrid file formats").
+Only quoted strings, free-standing numbers and ``<flags>`` have a meaning in Praat's text files, so that ``xmin = 0``
+and ``0`` are equivalent, and the long and the short form are one grammar (Praat manual, "TextGrid file formats").
 """
 
 import math
@@ -16,7 +15,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path, check_readable
 from a2g_jax.io.words import Word
 
-#: What aligners write for a stretch without a word.
+#: Labels that aligners write for silence.
 _SILENCES = frozenset({"", "sil", "sp", "<sil>", "<eps>", "<p:>"})
 _TOKEN = re.compile(r'"(?:[^"]|"")*+"|"|![^\n]*|[^\s"]++|\n')
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -29,11 +28,11 @@ def read_words(path: str | os.PathLike[str], tier: str | None = None) -> tuple[W
 
     Args:
         path: the file.
-        tier: name of the interval tier. None takes the one called ``words`` or ``word`` (or whose name ends so, as
-            in ``speaker - words``), else the first interval tier.
+        tier: name of the interval tier. None chooses one whose name ends with ``words`` or ``word`` (such as
+            ``speaker - words``), otherwise the first interval tier.
 
     Raises:
-        InputError: no such file, no TextGrid, damaged (with the line), or without that tier.
+        InputError: no such file, not a TextGrid, damaged (with the line), or without that tier.
     """
     path = check_readable(path, "a TextGrid file")
     tiers = _Parser(path, _text(path)).tiers()
@@ -64,7 +63,7 @@ def write_words(
         tiers: further interval tiers by name, such as ``{"phones": ...}``, under the same conditions.
 
     Raises:
-        InputError: times out of order or range, empty text, or a tier called ``words`` too many.
+        InputError: times out of order or range, empty text, or a further tier called ``words``.
     """
     path = Path(path)
     if not (math.isfinite(seconds) and seconds > 0):
@@ -93,7 +92,7 @@ def _intervals(path: Path, name: str, entries: Sequence[Word], seconds: float) -
         start, end = float(word.start), float(word.end)
         if not last <= start < end <= seconds:
             raise InputError(
-                f"{path}: not written: tier {name!r}: {word.text!r} lies at {start} to {end} s; expected times in "
+                f"{path}: not written: tier {name!r}: {word.text!r} is at {start} to {end} s; expected times in "
                 f"order, without overlap, from 0 to {seconds} s."
             )
         if last < start:
@@ -129,7 +128,7 @@ class _Parser:
         raise InputError(f"{self.path}, line {self.line}: {message}")
 
     def scan(self, text: str) -> Iterator[str | float]:
-        """Strings (with their opening quote), flags (``<...>``) and numbers; all else is decoration."""
+        """Strings (with their opening quote), flags (``<...>``) and numbers; the rest is skipped."""
         for match in _TOKEN.finditer(text):
             token = match.group()
             if token == '"':
@@ -161,7 +160,7 @@ class _Parser:
         return int(value)
 
     def tiers(self) -> list[tuple[str, tuple[Word, ...]]]:
-        """The interval tiers; point tiers are read over."""
+        """The interval tiers; point tiers are skipped."""
         kind = next(self.tokens, None)
         if kind not in ('"ooTextFile', '"ooTextFile short') or next(self.tokens, None) != '"TextGrid':
             self.fail('expected a TextGrid text file, which starts with File type = "ooTextFile"; save it as text.')

@@ -1,4 +1,4 @@
-"""Transcripts with word times, in the forms that data sets come with, and words at frame times."""
+"""Transcripts with word times, in the formats of data sets, and words at frame times."""
 
 import math
 import os
@@ -15,12 +15,12 @@ from a2g_jax.io.files import check_readable, read_json
 from a2g_jax.io.textgrid import read_words
 from a2g_jax.io.words import Word
 
-#: Longest recording that a transcript may speak of, in seconds: a number beyond is a mistake in units.
+#: Largest time in a transcript, in seconds: a larger number is an error in units.
 _LONGEST = 1e6
 _SECONDS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{0,12})?s?")
 _PREVIEW = 64
 _LARGEST_FILE = 2**26
-# Frame times and word times are both rounded decimals: this much of a frame is no difference.
+# Tolerance as a share of a frame: frame times and word times are both rounded decimals.
 _SLACK = 1e-6
 
 
@@ -35,11 +35,11 @@ def read_transcript(path: str | os.PathLike[str]) -> tuple[Word, ...]:
     tab-separated (``.tsv``)    ``start<TAB>end<TAB>word`` on each line, in seconds: GENEA 2022 and 2023
     ==========================  ===========================================================================
 
-    The suffix decides, and for another suffix the content. Recognisers round times, so a word may start where it
-    ends, or before the last one ends.
+    The suffix determines the form, or else the content. Recognisers round times, so a word may have no duration, or
+    start before the previous one ends.
 
     Raises:
-        InputError: no such file, another form, damaged (with the line or the place), or times that are not.
+        InputError: no such file, another form, damaged (with the line or the place), or invalid times.
     """
     path = check_readable(path, "a transcript (TextGrid, JSON or TSV)")
     if path.stat().st_size > _LARGEST_FILE:
@@ -51,13 +51,13 @@ def read_transcript(path: str | os.PathLike[str]) -> tuple[Word, ...]:
 def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.ndarray, " frames"]:
     """Index of the word that is spoken at each frame, -1 where there is none.
 
-    Frame k stands for the time k / fps; a word counts from its start until before its end. Where words overlap, the
-    one that started last counts. A word shorter than a frame may fall between two.
+    Frame k is at time k / fps; a word lasts from its start (inclusive) to its end (exclusive). Of overlapping words,
+    the one that started last counts. A word shorter than a frame may fall between two frames.
 
     Args:
         words: in any order.
-        fps: frames a second.
-        frames: how many.
+        fps: frames per second.
+        frames: number of frames.
     """
     if not (math.isfinite(fps) and fps > 0):
         raise InputError(f"fps: expected a positive number; got {fps}.")
@@ -71,9 +71,9 @@ def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.nd
 
 def _reader(path: Path) -> Callable[[Path], Any]:
     by_suffix: dict[str, Callable[[Path], Any]] = {".textgrid": read_words, ".json": _google, ".tsv": _table}
-    known = by_suffix.get(path.suffix.lower())
-    if known is not None:
-        return known
+    reader = by_suffix.get(path.suffix.lower())
+    if reader is not None:
+        return reader
     with path.open("rb") as file:
         start = file.read(_PREVIEW)
     if b"ooTextFile" in start.replace(b"\0", b""):
@@ -83,7 +83,7 @@ def _reader(path: Path) -> Callable[[Path], Any]:
         return _google
     if b"\t" in start:
         return _table
-    raise InputError(f"{path}: is no transcript that can be read; expected a TextGrid, JSON or TSV file.")
+    raise InputError(f"{path}: is not a transcript in a supported form; expected a TextGrid, JSON or TSV file.")
 
 
 def _google(path: Path) -> Iterator[Word]:

@@ -1,4 +1,4 @@
-"""A Transformer encoder whose attention reaches a fixed number of frames (Audio2Gestures, extended, Sec. 6.2.4)."""
+"""A Transformer encoder with attention to a fixed number of frames (Audio2Gestures, extended, Sec. 6.2.4)."""
 
 import jax
 import jax.numpy as jnp
@@ -11,8 +11,8 @@ from a2g_jax.nn.conv import Dense
 class LocalAttention(nn.Module):
     """One head of scaled dot-product attention to the frames at most ``reach`` away, before and after.
 
-    Where a frame stands is told by a learned bias for each distance: the papers name no position encoding, and one of
-    absolute frames would make the motion depend on where a window begins.
+    Positions are encoded by a learned bias for each distance: the papers name no position encoding, and one of absolute
+    frames would make the motion depend on where a window begins.
     """
 
     channels: int
@@ -49,7 +49,7 @@ class TransformerLayer(nn.Module):
 
 
 class Transformer(nn.Module):
-    """A linear layer to ``channels`` and encoder layers; with ``window`` frames in sight of each.
+    """A linear layer to ``channels`` and encoder layers, each with attention over ``window`` frames.
 
     One frame of the output depends on ``layers * window / 2`` frames on either side.
     """

@@ -13,10 +13,10 @@ _DIMENSIONS = ("NWC", "WIO", "NWC")
 
 @partial(jax.custom_vjp, nondiff_argnums=(2,))
 def conv1d(x: Float[Array, "B T C"], kernel: Float[Array, "K C D"], dilation: int = 1) -> Float[Array, "B T D"]:
-    """Convolution over time with symmetric zero padding, so T frames come out.
+    """Convolution over time with symmetric zero padding, so that the output has T frames.
 
-    Its backward pass is written out: XLA's own gradient with respect to the kernel falls off the fast path on CPU
-    inside control flow (a hundredfold), while K matrix products do not. The price is forward-mode differentiation.
+    Has a custom backward pass: inside control flow on CPU, XLA's own gradient with respect to the kernel is a hundred
+    times slower than K matrix products. The price is forward-mode differentiation.
 
     Args:
         kernel: K taps (odd) from C to D channels.
@@ -42,7 +42,7 @@ def _conv_backward(dilation, saved, dy):
     dx = _conv(dy, kernel[::-1].transpose(0, 2, 1), dilation)
     flat = lambda array: array.reshape(-1, array.shape[-1])  # noqa: E731
     offsets = [dilation * (tap - taps // 2) for tap in range(taps)]
-    # Frames of one side slide past the other; the one with fewer channels does, because sliding is a copy.
+    # Shifting is a copy, so the operand with fewer channels is shifted.
     if channels < features:
         dkernel = [flat(_slide(x, offset)).T @ flat(dy) for offset in offsets]
     else:
@@ -60,7 +60,7 @@ conv1d.defvjp(_conv_forward, _conv_backward)
 
 
 class Conv1D(nn.Module):
-    """:func:`conv1d` with a bias; weights start as Xavier's (Glorot's) uniform, the bias at zero."""
+    """:func:`conv1d` with a bias; weights initialised as Xavier's (Glorot's) uniform, the bias to zero."""
 
     features: int
     kernel_size: int = 3
@@ -77,7 +77,7 @@ class Conv1D(nn.Module):
 
 
 class Dense(nn.Module):
-    """A linear layer for every frame on its own; Xavier's uniform weights, zero bias."""
+    """A linear layer applied to every frame; Xavier's uniform weights, zero bias."""
 
     features: int
 

@@ -1,4 +1,4 @@
-"""Noise that is a function of a key and the absolute frame, whatever window is asked for."""
+"""Noise as a function of a key and the absolute frame, independent of the window."""
 
 from typing import TypeVar
 
@@ -33,7 +33,7 @@ def frame_normal(
 def slow_normal(
     key: Key[Array, ""], start: Int[Array, ""], frames: int, channels: int, period: int
 ) -> Float[Array, "frames channels"]:
-    """Standard normal noise that is drawn anew every ``period`` frames and turns smoothly from draw to draw.
+    """Standard normal noise that is redrawn every ``period`` frames, with smooth transitions between draws.
 
     Between draws a and b it is ``a cos(t) + b sin(t)``, t from 0 to pi / 2: every single frame is standard normal.
 

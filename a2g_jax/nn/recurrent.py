@@ -1,8 +1,8 @@
-"""Recurrent layers with PyTorch's gates, and a backward pass that does not slow down with the length.
+"""Recurrent layers with PyTorch's gates, and a backward pass whose cost per frame does not grow with the length.
 
-The input's share of every gate is one matrix product for all frames, before the scan. Autodiff would add a gradient as
-large as the weights at every frame; here the backward scan keeps the gates' gradients alone, and one product after it
-makes the weights' gradient of them. The price is forward-mode differentiation.
+The input's contribution to every gate is one matrix product for all frames, before the scan. Autodiff would add a
+gradient as large as the weights at every frame; here the backward scan keeps only the gradients of the gates, and one
+product after it gives the gradient of the weights. The price is forward-mode differentiation.
 """
 
 from functools import partial
@@ -21,7 +21,7 @@ def gru_step(
     """One frame of a GRU.
 
     ``r = s(x_r + h_r)``, ``z = s(x_z + h_z)``, ``n = tanh(x_n + r h_n)``, ``h' = (1 - z) n + z h``, where ``x`` is the
-    input's share of the gates (bias included) and ``h_* = h W + b``; gates lie in the order r, z, n.
+    input's contribution to the gates (bias included) and ``h_* = h W + b``; the order of gates is r, z, n.
     """
     return _gru_gates(projected, state, weights, bias)[0]
 
@@ -60,7 +60,7 @@ def gru_scan(
     weights: Float[Array, "H gates"],
     bias: Float[Array, " gates"],
 ) -> Float[Array, "T B H"]:
-    """:func:`gru_step` over frames, time first; gives the state after each."""
+    """States after each frame of a GRU, time first: :func:`gru_step` over frames."""
     return _gru_forward(projected, state, weights, bias)[0]
 
 
@@ -77,9 +77,9 @@ def _gru_backward(saved, upstream):
     state, states, gates, weights = saved
     before = jnp.concatenate([state[None], states[:-1]])
 
-    def step(carried, frame):
+    def step(carry, frame):
         dy, h, (r, z, n, h_n) = frame
-        dh = carried + dy
+        dh = carry + dy
         dn = dh * (1.0 - z) * (1.0 - n * n)
         dz = dh * (h - n) * z * (1.0 - z)
         dr = dn * h_n * r * (1.0 - r)
@@ -100,13 +100,13 @@ def lstm_scan(
     weights: Float[Array, "H gates"],
     bias: Float[Array, " gates"],
 ) -> tuple[Float[Array, "T B H"], Float[Array, "T B H"]]:
-    """:func:`lstm_step` over frames, time first; gives h and c after each."""
+    """States h and c after each frame of an LSTM, time first: :func:`lstm_step` over frames."""
     return _lstm_forward(projected, state, weights, bias)[0]
 
 
 def _lstm_forward(projected, state, weights, bias):
-    def step(carried, x):
-        new, gates = _lstm_gates(x, carried, weights, bias)
+    def step(carry, x):
+        new, gates = _lstm_gates(x, carry, weights, bias)
         return new, (new, gates)
 
     _, (states, gates) = jax.lax.scan(step, state, projected)
@@ -117,8 +117,8 @@ def _lstm_backward(saved, upstream):
     (h0, c0), (hs, cs), gates, weights = saved
     before_h, before_c = jnp.concatenate([h0[None], hs[:-1]]), jnp.concatenate([c0[None], cs[:-1]])
 
-    def step(carried, frame):
-        (dh, dc), (dy, dcell, c, new, (i, f, g, o)) = carried, frame
+    def step(carry, frame):
+        (dh, dc), (dy, dcell, c, new, (i, f, g, o)) = carry, frame
         dh, tanh = dh + dy, jnp.tanh(new)
         dc = dc + dcell + dh * o * (1.0 - tanh * tanh)
         parts = [dc * g * i * (1.0 - i), dc * c * f * (1.0 - f), dc * i * (1.0 - g * g), dh * tanh * o * (1.0 - o)]
@@ -134,7 +134,7 @@ lstm_scan.defvjp(_lstm_forward, _lstm_backward)
 
 
 def _product(states, gradients):
-    """Gradient of the recurrent weights: over all frames at once."""
+    """Gradient of the recurrent weights, of all frames at once."""
     return states.reshape(-1, states.shape[-1]).T @ gradients.reshape(-1, gradients.shape[-1])
 
 
@@ -166,7 +166,7 @@ def _uniform(key, shape, scale):
 
 
 class GRU(_Recurrent):
-    """One layer; weights start uniform within the root of one over its width, as PyTorch's.
+    """One GRU layer; weights initialised uniform within the root of one over its width, as PyTorch's.
 
     Args:
         reverse: read from the last frame to the first.
@@ -176,7 +176,7 @@ class GRU(_Recurrent):
     def __call__(
         self, x: Float[Array, "B T C"], state: Float[Array, "B H"] | None = None
     ) -> tuple[Float[Array, "B T H"], Float[Array, "B H"]]:
-        """Outputs, and the state after the frame that was read last."""
+        """Outputs, and the state after the last frame in the order of reading."""
         input_kernel, input_bias, kernel, bias = self._weights(3, x.shape[-1])
         if state is None:
             state = jnp.zeros((x.shape[0], self.features), x.dtype)
@@ -185,13 +185,13 @@ class GRU(_Recurrent):
 
 
 class LSTM(_Recurrent):
-    """One layer, as :class:`GRU`; its state is (h, c)."""
+    """One LSTM layer, initialised as :class:`GRU`; its state is (h, c)."""
 
     @nn.compact
     def __call__(
         self, x: Float[Array, "B T C"], state: tuple[Float[Array, "B H"], Float[Array, "B H"]] | None = None
     ) -> tuple[Float[Array, "B T H"], tuple[Float[Array, "B H"], Float[Array, "B H"]]]:
-        """Outputs, and the state after the frame that was read last."""
+        """Outputs, and the state after the last frame in the order of reading."""
         input_kernel, input_bias, kernel, bias = self._weights(4, x.shape[-1])
         if state is None:
             zeros = jnp.zeros((x.shape[0], self.features), x.dtype)

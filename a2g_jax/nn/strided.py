@@ -1,4 +1,4 @@
-"""Convolutions that thin out time or frequency, and the way back up in time."""
+"""Strided convolutions over time or frequency, and upsampling in time."""
 
 import jax.numpy as jnp
 from flax import linen as nn
@@ -9,9 +9,9 @@ from jaxtyping import Array, Float
 def strided_conv1d(x: Float[Array, "B T C"], kernel: Float[Array, "K C D"], stride: int) -> Float[Array, "B _ D"]:
     """Convolution over time that keeps every ``stride``-th frame, with zero padding.
 
-    Frame t of the result sees frames ``stride * t - p`` to ``stride * t - p + K - 1`` with ``p = (K - stride) // 2``;
-    there are ``ceil(T / stride)``. Frames side by side become channels, so that both passes are matrix products, which
-    stay fast inside ``lax.scan`` on CPU.
+    Frame t of the result depends on frames ``stride * t - p`` to ``stride * t - p + K - 1`` with
+    ``p = (K - stride) // 2``; there are ``ceil(T / stride)``. Neighbouring frames become channels, so that both passes
+    are matrix products, which stay fast inside ``lax.scan`` on CPU.
 
     Args:
         kernel: K taps, a multiple of the stride.
@@ -25,12 +25,12 @@ def strided_conv1d(x: Float[Array, "B T C"], kernel: Float[Array, "K C D"], stri
     clips, frames = x.shape[:2]
     count, groups, before = -(-frames // stride), taps // stride, (taps - stride) // 2
     after = (count + groups - 1) * stride - before - frames
-    # Less than no padding where the last frames are in nobody's sight.
+    # Negative padding crops last frames that no output depends on.
     blocks = lax.pad(x, jnp.zeros((), x.dtype), ((0, 0, 0), (before, after, 0), (0, 0, 0)))
     blocks = blocks.reshape(clips, count + groups - 1, stride * channels)
     weights = kernel.reshape(groups, stride * channels, features)
-    seen = jnp.concatenate([blocks[:, group : group + count] for group in range(groups)], axis=-1)
-    return seen @ weights.reshape(groups * stride * channels, features)
+    receptive = jnp.concatenate([blocks[:, group : group + count] for group in range(groups)], axis=-1)
+    return receptive @ weights.reshape(groups * stride * channels, features)
 
 
 def image_conv(
@@ -39,8 +39,8 @@ def image_conv(
     """Convolution over time and frequency that keeps every frame and every ``band_stride``-th band, with zero padding.
 
     Args:
-        kernel: K taps in time (odd) times L bands; of the ``ceil(F / band_stride)`` bands that come out, band f sees
-            those from ``band_stride * f - (L - band_stride) // 2`` on.
+        kernel: K taps in time (odd) times L bands; of the ``ceil(F / band_stride)`` output bands, band f depends on L
+            bands from ``band_stride * f - (L - band_stride) // 2`` on.
     """
     taps, height = kernel.shape[:2]
     bands = -(-x.shape[2] // band_stride)
@@ -51,7 +51,7 @@ def image_conv(
 
 
 def repeat_frames(x: Float[Array, "B T C"], times: int) -> Float[Array, "B _ C"]:
-    """Every frame so many times in a row."""
+    """Every frame repeated ``times`` times in a row."""
     clips, frames, channels = x.shape
     many = jnp.broadcast_to(x[:, :, None], (clips, frames, times, channels))
     return many.reshape(clips, frames * times, channels)

@@ -28,7 +28,7 @@ class ResidualBlock(nn.Module):
 
 
 class TCN(nn.Module):
-    """Residual blocks one after another, block i with dilation ``2 ** i``; sees past and future alike."""
+    """Residual blocks in sequence, block i with dilation ``2 ** i``; non-causal: past and future count alike."""
 
     channels: Sequence[int]
     kernel_size: int = 3

@@ -50,7 +50,7 @@ def test_frames_do_not_drift():
 
 
 @pytest.mark.parametrize("frames", [0, 1, 29, 30, 31, 200])
-def test_gives_as_many_rows_as_asked_for(frames):
+def test_gives_the_requested_number_of_rows(frames):
     result = log_mel(speech_like(1), PLAIN, 30.0, frames)
     assert result.shape == (frames, 64)
     assert np.isfinite(result).all()

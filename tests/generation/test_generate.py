@@ -1,7 +1,6 @@
 """Generation: exact lengths, seeds, windows, and roots that stand."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -9,9 +8,9 @@ from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import chosen_formats
 from a2g_jax.generation.generator import Generator
+from a2g_jax.geometry.euler import euler_matrices
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.rotation import matrix_from_euler
 from a2g_jax.io.audio import write_audio
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.skeleton import TALKER_SKELETON
@@ -81,7 +80,7 @@ def test_feet_stay_when_hips_sway():
     frames = 90
     tilt = 0.05 * np.sin(np.arange(frames) / 10)
     rotations = np.tile(np.eye(3, dtype=np.float32), (frames, 22, 1, 1))
-    roll = np.asarray(matrix_from_euler(jnp.stack([jnp.zeros(frames), jnp.zeros(frames), jnp.asarray(tilt)], 1), "XYZ"))
+    roll = euler_matrices(np.degrees(tilt)[:, None], "Z").astype(np.float32)
     rotations[:, 0] = roll
     rotations[:, [1, 2]] = np.swapaxes(roll, -1, -2)[:, None]
     motion = Motion(rotations, np.zeros((frames, 3), np.float32), TALKER_SKELETON, 30.0)

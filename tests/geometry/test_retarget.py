@@ -121,7 +121,7 @@ def test_fingers_and_hips(dialect):
 
 
 def test_twist_of_a_straight_arm_survives():
-    """A roll about the bone moves no joint, and is carried over all the same."""
+    """A roll about the bone moves no joint, but is retargeted as well."""
     still = Poses.random(2, 0)
     parts = {part: np.tile(np.eye(3), (2, 1, 1)) for part in still.parts}
     c, s = np.cos(0.9), np.sin(0.9)
@@ -136,7 +136,7 @@ def test_twist_of_a_straight_arm_survives():
 
 
 def test_a_bent_elbow_shows_the_twist_of_its_arm():
-    """Where the zero pose is meaningless and no T-pose was captured, the elbow's hinge tells the upper arm's roll."""
+    """Where the zero pose is meaningless and no T-pose was captured, the elbow's hinge gives the upper arm's roll."""
     talk, still = Poses.random(3, 2), Poses.random(2, 0)
     parts = {part: np.concatenate([np.eye(3)[None], turns]) for part, turns in talk.parts.items()}
     for side, sign in (("L", 1.0), ("R", -1.0)):
@@ -169,8 +169,8 @@ def test_soles_stay_on_the_ground():
 @pytest.mark.parametrize("up", ["Y", "Z", "-Y", "X"])
 def test_unit_and_vertical_axis(scale, unit, up):
     motion, _ = Spec(scale=scale, up=up).build(POSES)
-    for seen in (motion, motion.skeleton):
-        rig = find_rig(seen)
+    for source in (motion, motion.skeleton):
+        rig = find_rig(source)
         assert rig.unit_factor == unit
         assert rig.up == (up if up.startswith("-") else f"+{up}")
     assert find_rig(motion, up="-X").up == "-X"
@@ -240,7 +240,7 @@ def test_what_is_missing_is_named():
     chain = Skeleton(np.ones((3, 3), np.float32), ("a", "b", "c"), (-1, 0, 1))
     with pytest.raises(InputError, match="walk.bvh: no L_Shoulder"):
         find_rig(chain, name="walk.bvh")
-    # One name missing: the shape of the tree still tells.
+    # One name missing: the part is found by the shape of the tree.
     renamed = dataclasses.replace(motion.skeleton, names=names)
     assert find_rig(dataclasses.replace(motion, skeleton=renamed)).roles["L_Shoulder"] == joints["L_Shoulder"]
     assert find_rig(renamed, joints={"L_Shoulder": "Thing"}).by_shape is False

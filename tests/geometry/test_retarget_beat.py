@@ -24,7 +24,7 @@ def wrists(motion, place):
 
 @pytest.mark.parametrize(("place", "least"), [("chest", 0.97), ("pelvis", 0.8)])
 def test_wrist_paths_agree(place, least, shared):
-    """Correlation of each coordinate, at no shift; the trunk hardly moves in BEAT's file, so the chest tells more."""
+    """Correlation of each coordinate, without shift; BEAT's trunk hardly moves, so the chest is compared too."""
     name = "2_scott_0_1_1"
     motions = [read_bvh(shared / f"beat/{name}.bvh"), inspect_npz(shared / f"beat2/{name}.npz").motion]
     frames = int(min(motion.seconds for motion in motions) * 15)

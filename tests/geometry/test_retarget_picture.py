@@ -1,4 +1,4 @@
-"""The picture of retargeting can be drawn, and its other rig is as it says."""
+"""The picture of retargeting can be drawn, and its other rig has the properties in its caption."""
 
 import numpy as np
 import pytest

@@ -124,14 +124,14 @@ def flac_bytes(tmp_path):
 
 BROKEN = {
     "empty": (b"", "is empty"),
-    "no samples": (wav_bytes(b""), "holds no samples"),
+    "no samples": (wav_bytes(b""), "contains no samples"),
     "text": (b"this is a transcript\n" * 10, "is text, not audio"),
     "binary": (bytes(range(256)) * 4, "is not audio that can be read"),
     "only RIFF": (b"RIFF\x24", "cut short inside its header"),
     "header only": (wav_bytes(SAMPLES)[:30], "no 'data' chunk"),
     "cut": (
         wav_bytes(SAMPLES)[:-2000],
-        "the header says 16000 bytes of samples and the file holds 14000",
+        "the header says 16000 bytes of samples and the file has 14000",
     ),
     "lying header": (wav_bytes(SAMPLES, data_size=2_000_000_000), "is cut short"),
     "damaged format": (wav_bytes(SAMPLES, form=0x7777), "is a damaged audio file"),
@@ -195,9 +195,9 @@ def test_channels_that_cancel_out(tmp_path):
     [
         ("a.wav", [], "PCM_16", "no samples"),
         ("a.wav", [0.0, np.nan], "PCM_16", "NaN or infinity at 1.000 s"),
-        ("a.txt", [0.5], "PCM_16", "is no audio format"),
-        ("a", [0.5], "PCM_16", "is no audio format"),
-        ("a.raw", [0.5], "PCM_16", "is no audio format"),
+        ("a.txt", [0.5], "PCM_16", "is not an audio format"),
+        ("a", [0.5], "PCM_16", "is not an audio format"),
+        ("a.raw", [0.5], "PCM_16", "is not an audio format"),
         ("a.ogg", [0.5], "PCM_16", "has no encoding PCM_16; it has VORBIS"),
         ("a.flac", [0.5], "PCM_16", "cannot be written"),
     ],

@@ -40,12 +40,12 @@ def test_blender_sees_the_same_joints(tmp_path):
     shown = subprocess.run([blender, "-b", "--python-expr", script], capture_output=True, text=True, timeout=240)
     line = next((line for line in shown.stdout.splitlines() if line.startswith("HEADS")), None)
     assert line is not None, shown.stdout[-2000:] + shown.stderr[-2000:]
-    seen = json.loads(line.removeprefix("HEADS"))
-    assert seen["fps"] == 30
-    assert seen["last"] >= 119
+    found = json.loads(line.removeprefix("HEADS"))
+    assert found["fps"] == 30
+    assert found["last"] >= 119
     positions = motion.positions()
     for frame in frames:
         for joint, name in enumerate(motion.skeleton.names):
-            x, y, z = seen["heads"][str(frame)][name]
+            x, y, z = found["heads"][str(frame)][name]
             # Blender is Z-up.
             np.testing.assert_allclose([x, z, -y], positions[frame, joint], atol=1e-3)

@@ -8,7 +8,6 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 from a2g_jax.io.bvh import read_bvh, write_bvh
-from a2g_jax.io.euler import continuous_euler
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
@@ -87,42 +86,6 @@ def test_deep_chain(tmp_path, scale):
     motion = random_motion(1, 120, 3, chain=True)
     result = again(motion, tmp_path / "a.bvh", scale=scale)
     np.testing.assert_allclose(place(result), place(motion), atol=1e-5)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_euler_angles_are_those_of_scipy(order):
-    rotations = Rotation.random(500, rng=np.random.default_rng(0))
-    angles = continuous_euler(rotations.as_matrix()[None], order)[0]
-    np.testing.assert_allclose(angles, rotations.as_euler(order, degrees=True), atol=1e-6)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("nearness", [0.0, 1e-9, 1e-6, 1e-4, 1e-3])
-@pytest.mark.parametrize("precision", [np.float32, np.float64])
-def test_euler_angles_near_gimbal_lock(order, nearness, precision):
-    random = np.random.default_rng(0)
-    degrees = random.uniform(-180, 180, (200, 3))
-    degrees[:, 1] = random.choice([-90, 90], 200) + nearness * random.uniform(-1, 1, 200)
-    matrices = Rotation.from_euler(order, degrees, degrees=True).as_matrix().astype(precision)
-    angles = continuous_euler(matrices[:, None].astype(np.float64), order)[:, 0]
-    result = Rotation.from_euler(order, angles, degrees=True).as_matrix()
-    np.testing.assert_allclose(result, matrices, atol=2e-6)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_angles_run_on_through_turns_and_over_the_pole(order):
-    time = np.linspace(0, 1, 400)
-    degrees = np.stack([1000 * time, 50 * np.sin(9 * time) + 120 * time, -700 * time], axis=-1)
-    matrices = Rotation.from_euler(order, degrees, degrees=True).as_matrix()
-    angles = continuous_euler(matrices[:, None], order)[:, 0]
-    assert np.abs(np.diff(angles, axis=0)).max() < 5
-    np.testing.assert_allclose(np.diff(angles, axis=0), np.diff(degrees, axis=0), atol=1e-5)
-
-
-def test_still_in_gimbal_lock_stays_still():
-    matrices = Rotation.from_euler("ZXY", [[20, 80, 0], [20, 90, 0], [20, 90, 0], [20, 89, 0]], degrees=True)
-    angles = continuous_euler(matrices.as_matrix()[:, None], "ZXY")[:, 0]
-    np.testing.assert_allclose(angles, [[20, 80, 0], [20, 90, 0], [20, 90, 0], [20, 89, 0]], atol=1e-5)
 
 
 def body(frames=2, **changes) -> Motion:

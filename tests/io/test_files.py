@@ -116,7 +116,7 @@ def test_write_json_refuses_what_json_cannot_hold(tmp_path, value):
     [
         (b'{"a": 1,\n "b" 2}', "line 2, column 6: is not JSON"),
         (b"\xff\xfe", "is not UTF-8"),
-        (b"[NaN]", "holds NaN"),
+        (b"[NaN]", "contains NaN"),
         (b"[" * 100_000, "nested too deeply"),
         (b"9" * 10_000, "cannot be read as JSON"),
     ],

@@ -103,7 +103,7 @@ def test_other_files_are_never_reached(path, tmp_path):
         refused(path, name, "is a link to '.*which is refused")
     refused(path, "soft", "is a link to '/folder/a', which is refused")
     for name in ("virtual", "raw"):
-        refused(path, name, f"'{name}' lies in other files, which is refused")
+        refused(path, name, f"'{name}' is stored in other files, which is refused")
 
 
 def test_other_types_are_refused(path):

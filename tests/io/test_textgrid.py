@@ -176,11 +176,11 @@ def test_other_encodings_and_paths(tmp_path):
 @pytest.mark.parametrize(
     ("words", "seconds", "tiers", "message"),
     [
-        ([Word("a", 0.0, 1.0), Word("b", 0.5, 2.0)], 3.0, None, "'b' lies at 0.5 to 2.0 s"),
-        ([Word("a", 1.0, 1.0)], 3.0, None, "lies at"),
-        ([Word("a", -1.0, 1.0)], 3.0, None, "lies at"),
-        ([Word("a", 0.0, 4.0)], 3.0, None, "lies at"),
-        ([Word("a", 0.0, float("nan"))], 3.0, None, "lies at"),
+        ([Word("a", 0.0, 1.0), Word("b", 0.5, 2.0)], 3.0, None, "'b' is at 0.5 to 2.0 s"),
+        ([Word("a", 1.0, 1.0)], 3.0, None, "is at"),
+        ([Word("a", -1.0, 1.0)], 3.0, None, "is at"),
+        ([Word("a", 0.0, 4.0)], 3.0, None, "is at"),
+        ([Word("a", 0.0, float("nan"))], 3.0, None, "is at"),
         ([Word(" ", 0.0, 1.0)], 3.0, None, "printable word"),
         ([Word("a\nb", 0.0, 1.0)], 3.0, None, "printable word"),
         ([], 0.0, None, "positive length"),

@@ -110,9 +110,9 @@ WRONG = {
     "a.json: result 2, word 1: expected a time in seconds from 0 on; got int": google({**GOOD, "end_time": 10**400}),
     "a.json, line 1, column 2: is not JSON": "[",
     "a.json: is nested too deeply": "[" * 100_000,
-    "a.json: holds NaN": google({**GOOD, "end_time": float("nan")}),
-    "a.txt: is no transcript that can be read": "hello",
-    "a.srt: is no transcript that can be read": "1\n00:00:01 --> 00:00:02\nhello\n",
+    "a.json: contains NaN": google({**GOOD, "end_time": float("nan")}),
+    "a.txt: is not a transcript in a supported form": "hello",
+    "a.srt: is not a transcript in a supported form": "1\n00:00:01 --> 00:00:02\nhello\n",
     "a.TextGrid, line 1: expected a TextGrid text file": "hello",
     "a.tsv: is empty": "",
 }

@@ -74,7 +74,7 @@ def test_large_values_keep_their_order():
 
 
 def marked(kind, data, **more):
-    """What pyarrow's handlers made of a type that Arrow has not."""
+    """What pyarrow's handlers write for a type without an Arrow type."""
     return arrow_payload({"_pytype_": kind, "data": data, **more})
 
 
@@ -131,7 +131,7 @@ def test_depth():
 
 
 def test_elements_that_share_one_child_cost_each_time():
-    # The first column of rising numbers says where the lists lie: let all of them be the first one, which is long.
+    # The first column of increasing numbers holds the bounds of the lists: make all of them the first, long one.
     value = [list(range(50)), *([n] for n in range(300))]
     whole = arrow_payload(value)
     rising = np.arange(301, dtype="<i4").tobytes()

@@ -83,11 +83,11 @@ def test_old_headers(tmp_path):
         assert same(read_npy(path), np.array([1, 2], "<i2"))
 
 
-def test_python_objects_only_where_asked_for_and_plain(tmp_path):
+def test_python_objects_only_where_allowed_and_plain(tmp_path):
     path = tmp_path / "a.npy"
     array = np.array([[1, "a"], [None, [2.5, {"b": (3,)}]]], object)
     path.write_bytes(npy(array, pickled=True))
-    with pytest.raises(InputError, match="Python objects, which are not read"):
+    with pytest.raises(InputError, match="Python objects, which are not allowed"):
         read_npy(path)
     assert same(read_npy(path, objects=True), array)
     canary = tmp_path / "canary"
@@ -110,7 +110,7 @@ HEADERS = {
     "an array of type 'U999999999'": "{'descr': 'U999999999', 'fortran_order': False, 'shape': (0,), }",
     "beyond the limit": "{'descr': '<i4', 'fortran_order': False, 'shape': (99999999999,), }",
     "beyond the limit.": "{'descr': '<i4', 'fortran_order': False, 'shape': (0, 99999999999,), }",
-    "takes 8000000000 bytes and 0 are there": "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000,), }",
+    "takes 8000000000 bytes and has 0": "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000,), }",
     "up to 32 whole numbers": f"{{'descr': '<i4', 'fortran_order': False, 'shape': ({'1,' * 33}), }}",
     "not as numpy.save writes it": "{'descr': '<i4', 'fortran_order': __import__('os'), 'shape': (2,), }",
     "not as numpy.save": "{'descr': '<i4', 'descr': '<i4', 'shape': (2,), }",
@@ -135,9 +135,12 @@ def test_headers_that_are_refused(name, tmp_path):
         (b"x", "is not a NumPy array"),
         (b"\x93NUMPY\x09\x00\x10\x00" + b" " * 20, "format 9.0"),
         (b"\x93NUMPY\x02\x00\xff\xff\xff\x7f" + b" " * 20, "a header of 2147483647 bytes"),
-        (with_header("{'descr': '|b1', 'fortran_order': False, 'shape': (2,), }", b"\x01\x02"), "truth value"),
-        (with_header("{'descr': '<U1', 'fortran_order': False, 'shape': (), }", b"\xff\xff\xff\xff"), "no Unicode"),
-        (with_header("{'descr': '|u1', 'fortran_order': False, 'shape': (1,), }", b"\x01\x02"), "takes 1 bytes and 2"),
+        (with_header("{'descr': '|b1', 'fortran_order': False, 'shape': (2,), }", b"\x01\x02"), "boolean"),
+        (with_header("{'descr': '<U1', 'fortran_order': False, 'shape': (), }", b"\xff\xff\xff\xff"), "not Unicode"),
+        (
+            with_header("{'descr': '|u1', 'fortran_order': False, 'shape': (1,), }", b"\x01\x02"),
+            "takes 1 bytes and has 2",
+        ),
     ],
 )
 def test_damage_is_named(data, match, tmp_path):
@@ -168,11 +171,11 @@ def test_bombs_stop_at_the_limit(tmp_path):
     with pytest.raises(InputError, match="would take more than 262144 bytes"):
         read_npz(path, limits=limits)
     assert peak_memory(lambda: read_npz(path, limits=limits)) < limits.size + PIECE
-    for size in (1000, 0):  # it says that it is small
+    for size in (1000, 0):  # claimed to be small
         claim(path, size)
         with pytest.raises(InputError, match="is damaged|not a NumPy array"):
             read_npz(path, limits=limits)
-    claim(path, 2**30)  # it says that it is large
+    claim(path, 2**30)  # claimed to be large
     with pytest.raises(InputError, match="is damaged"):
         read_npz(path)
     assert peak_memory(read_npz, path) < 8 * 2**20

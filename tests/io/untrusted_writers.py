@@ -84,7 +84,7 @@ class _Union:
         self.types: list[int] = []
         self.places: list[int] = []
         self.valid: list[bool] = []
-        self.atoms: dict[int, list[Any]] = {}  # also says in which order the columns come
+        self.atoms: dict[int, list[Any]] = {}  # in the order of the columns
         self.parts: dict[int, list[_Union]] = {}
 
     def add(self, values: Any) -> None:

@@ -138,7 +138,7 @@ def test_terms_of_weight_zero_cost_no_gradient(params, batch):
     """The re-encoding behind the bicycle loss is traced, but the gradient does not pass through it."""
 
     def convolutions(config):
-        loss = build(config, DATA).loss
+        loss = joint_loss(build(config, DATA).stages[0])
         program = jax.make_jaxpr(jax.grad(lambda p: loss(p, jax.random.key(0), batch, jnp.int32(0))[0]))(params)
         return str(program).count("conv_general_dilated")
 

@@ -84,7 +84,7 @@ class TestBlendedDraws:
         assert stats.chisquare(np.bincount(np.asarray(rows, int), minlength=5)).pvalue > 0.01
 
     def test_far_into_a_long_audio(self):
-        """Two hours at 30 fps: float32 still tells frames within a period apart."""
+        """Two hours at 30 fps: float32 still resolves frames within a period."""
         start = 216_000
         values = np.asarray(draws(KEY, self.table, start_at(start), 240, 20)[0])[:, 0]
         knots = values[::20]

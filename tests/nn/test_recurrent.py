@@ -71,8 +71,8 @@ def _slow(step, gates):
     """The same by autodiff alone."""
 
     def scan(projected, state, weights, bias):
-        def one(carried, x):
-            new = step(x, carried, weights, bias)
+        def one(carry, x):
+            new = step(x, carry, weights, bias)
             return new, new
 
         return jax.lax.scan(one, state, projected)[1]

@@ -1,4 +1,4 @@
-"""Which joint of one rig moves which joint of another."""
+"""Correspondence of the joints of two rigs."""
 
 import math
 from dataclasses import dataclass
@@ -13,25 +13,25 @@ from a2g_jax.geometry.retarget.poses import angle_between, joint_places
 from a2g_jax.geometry.retarget.rest import ankle_height
 from a2g_jax.geometry.retarget.rig import Rig
 
-#: Bones that are rigid: what lies between the two parts is a twist bone, which turns but does not bend.
+#: Rigid segments: a joint between their two ends is a twist bone, which twists but does not bend.
 _RIGID = {"Shoulder": "Elbow", "Elbow": "Wrist", "Hip": "Knee", "Knee": "Ankle"}
 _NEXT = {**_RIGID, "Collar": "Shoulder", "Ankle": "Foot", "Wrist": "Middle1"}
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One joint of the target that takes its pose from one of the source."""
+    """A joint of the target and the joint of the source whose pose it copies."""
 
     target: int
     source: int
     role: str
     how: str
-    """``"name"``, ``"shape"`` (topology), ``"order"`` (spines and necks are counted) or ``"same name"``."""
+    """``"name"``, ``"shape"`` (topology), ``"order"`` (spines and necks) or ``"same name"``."""
 
 
 @dataclass(frozen=True)
 class Share:
-    """A joint of the target between two matched ones that takes a part of the way from one's pose to the other's."""
+    """A joint of the target between two matched ones, posed by interpolation between their poses."""
 
     target: int
     above: int
@@ -41,19 +41,19 @@ class Share:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """The joints of two rigs set against each other; print :meth:`table` to see it."""
+    """Correspondence of two rigs; :meth:`table` shows it."""
 
     source: Rig
     target: Rig
     pairs: tuple[Pair, ...]
     shares: tuple[Share, ...]
     scale: float
-    """Target over source: leg length, or length of the arms where one has no legs."""
+    """Target over source: leg length, or arm length where one of the two has no legs."""
     lift: float
-    """Metres that the target's hips are raised after scaling, so that its soles are where the source's are."""
+    """Metres by which the target's hips are raised after scaling, so that its soles are where the source's are."""
 
     def table(self) -> str:
-        """One line a joint of the target: source joints, how found, angle of bones at rest, ratio of their lengths."""
+        """Text with a line for each target joint: source joints, how matched, angle at rest, ratio of bone lengths."""
         rows = [("source", "target", "part", "found by", "rest angle", "length")]
         matched_sources = {pair.source for pair in self.pairs}
         matched = {pair.target for pair in self.pairs}
@@ -105,10 +105,11 @@ class Match:
 def match_rigs(source: Rig, target: Rig) -> Match:
     """Match the joints of two rigs.
 
-    Limbs, head, pelvis and fingers match by their part. Spines and necks are counted: first to first, last to last,
-    the others by their place between. A twist bone within a limb matches one in the same place, otherwise its rotation
-    goes with the bone it belongs to. What is left matches by equal names below matched joints. Joints of the target
-    that remain take a share (spines, necks) or stay at rest below their parents (twist bones, fingers, leaf ends).
+    Limbs, head, pelvis and fingers match by their part. Spines and necks match by order: first to first, last to last,
+    the others by relative position. Twist bones of a limb match where both rigs have equally many; otherwise their
+    rotation is added to that of the limb. Remaining joints match by equal names below matched joints. Target joints
+    without a match are interpolated (spines, necks) or stay at rest below their parents (twist bones, fingers, leaf
+    ends).
 
     Raises:
         InputError: the rigs have no arms in common.
@@ -130,7 +131,7 @@ def match_rigs(source: Rig, target: Rig) -> Match:
             for at, (ours_joint, theirs_joint) in enumerate(zip(ours, theirs, strict=True)):
                 add(ours_joint, theirs_joint, role if at == len(ours) - 1 else f"{role}, part {at + 1}", found)
         else:
-            # The last twist bone has the whole rotation of the segment.
+            # The last twist bone has the rotation of the whole segment.
             add(ours[0], theirs[-1], role, found)
     shares = []
     for to, of, label, end in ((target.spine, source.spine, "Spine", -1), (target.neck, source.neck, "Neck", 0)):
@@ -158,7 +159,7 @@ def _segment(rig: Rig, role: str) -> list[int]:
 
 
 def _counted(ours: int, theirs: int, single: int) -> list[tuple[int, int]]:
-    """Pairs of places in two chains, ends to ends; a chain of one goes with place ``single`` of the other."""
+    """Pairs of indices into two chains, ends to ends; a chain of one is paired with index ``single`` of the other."""
     few, many = min(ours, theirs), max(ours, theirs)
     if few == 0:
         return []
@@ -191,7 +192,7 @@ def _matched_above(parents: tuple[int, ...], joint: int, matched: set[int]) -> i
 
 
 def _composed(parents: tuple[int, ...], joint: int, matched: set[int]) -> list[int]:
-    """The joint and the unmatched ones above it, whose rotations it carries, from above."""
+    """The joint and the unmatched ones above it, whose rotations it includes, from above."""
     joints = [joint]
     while parents[joints[0]] >= 0 and parents[joints[0]] not in matched:
         joints.insert(0, parents[joints[0]])
@@ -200,8 +201,8 @@ def _composed(parents: tuple[int, ...], joint: int, matched: set[int]) -> list[i
 
 def _shares(chain: list[int], matched: set[int]) -> list[Share]:
     shares = []
-    known = [at for at, joint in enumerate(chain) if joint in matched]
-    for above, below in zip(known, known[1:], strict=False):
+    anchors = [at for at, joint in enumerate(chain) if joint in matched]
+    for above, below in zip(anchors, anchors[1:], strict=False):
         for at in range(above + 1, below):
             weight = (at - above) / (below - above)
             shares.append(Share(chain[at], chain[above], chain[below], weight))
@@ -219,7 +220,7 @@ def _scale(source: Rig, target: Rig) -> tuple[float, float]:
         bones = [(a, b) for row in joints for a, b in zip(row, row[1:], strict=False)]
         lengths.append(sum(np.linalg.norm(places[b] - places[a]) for a, b in bones))
     if min(lengths) < 1e-9:
-        raise InputError("A rig has limbs of no length; its file has no offsets. Use a rig with bones.")
+        raise InputError("A rig has limbs of zero length; its file has no offsets. Use a rig with bones.")
     scale = float(lengths[1] / lengths[0])
     if not legs:
         return scale, 0.0

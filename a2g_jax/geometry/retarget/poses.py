@@ -1,7 +1,7 @@
-"""Directions, frames and forward kinematics of whole poses, vectorised over frames in NumPy.
+"""Directions, frames and forward kinematics of poses, vectorised over frames in NumPy.
 
-A rig has its own tree, so a compiled kernel would be compiled anew for every rig: for one take that costs more than
-it saves.
+Every rig has its own tree, so a compiled kernel would be recompiled for every rig, which for one take costs more time
+than it saves.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ def rotation_angle(first: Matrix, second: Matrix) -> Float[np.ndarray, "*batch"]
 
 
 def shortest_turn(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """The rotation of least angle that takes one direction to another; any half turn for opposite ones."""
+    """The rotation of least angle from one direction to another; any half turn for opposite directions."""
     start, end = unit(start), unit(end)
     cosine = float(start @ end)
     if cosine < -1 + 1e-9:
@@ -67,14 +67,14 @@ def shortest_turn(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) ->
 
 
 def frame_of(first: Float[np.ndarray, "3"], second: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Orthonormal columns: along ``first``, ``second`` as far as it is square to it, and their cross product."""
+    """Orthonormal columns: ``first``, the part of ``second`` perpendicular to it, and their cross product."""
     first = unit(first)
     second = unit(second - first * (first @ second))
     return np.stack([first, second, np.cross(first, second)], axis=1)
 
 
 def between(start: Matrix, end: Matrix, weight: float) -> Matrix:
-    """The rotation a part of the way from one to another along the shorter arc."""
+    """Interpolation of two rotations along the shorter arc, ``weight`` 0 (start) to 1 (end)."""
     turn = np.swapaxes(start, -1, -2) @ end
     skew = turn - np.swapaxes(turn, -1, -2)
     axis = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1) / 2

@@ -5,9 +5,9 @@ person's left (x), up (y) and forward (z). In the reference pose, written with `
 
     R_rest_anatomy = turn @ R_rest_body,        R_joint_anatomy = R_rest_joint^T @ R_rest_anatomy,
 
-where ``turn`` (identity for the trunk) takes the bone from where it lies in a T-pose, palms down and feet flat, to
-where it lies in the reference pose, by the shortest way from the turn of its parent. An arm that hangs in an A-pose
-is so known to be a lowered arm, with the twist it had. ``R_joint_anatomy`` is constant, and
+where ``turn`` (identity for the trunk) rotates the bone from its direction in a T-pose, palms down and feet flat, to
+its direction in the reference pose, by the smallest rotation from the turn of its parent. So the arm of an A-pose is
+recognised as a lowered arm, with its twist. ``R_joint_anatomy`` is constant, and
 
     R_world_anatomy(t) = R_world_joint(t) @ R_joint_anatomy
 
@@ -24,14 +24,14 @@ from a2g_jax.geometry.joint_names import FINGERS
 from a2g_jax.geometry.retarget.poses import Vector, angle_between, frame_of, shortest_turn, unit
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: An elbow or a knee bent by more degrees than this in the reference pose shows its hinge, and so the limb's twist.
+#: An elbow or a knee bent by more degrees than this in the reference pose defines its hinge axis, and so the twist.
 _SHOWS_HINGE = 15.0
-#: A foot bone that lies flatter than the first angle was drawn without regard to the sole; the usual slope, in
-#: degrees, from ankle to ball of a flat foot is the second (25 in the generated body, 27 in standing ZeroEGGS takes).
+#: A foot bone flatter than the first angle, in degrees, does not follow the sole; the second is the usual slope from
+#: ankle to ball of a flat foot (25 in the generated body, 27 in standing ZeroEGGS takes).
 _FLAT_FOOT, _USUAL_SLOPE = 5.0, 25.0
-#: A hand without fingers whose end lies farther from the line of the forearm, in degrees, was not drawn with it.
+#: An end site of a hand without fingers that deviates by more degrees from the forearm is no hand direction.
 _BENT_HAND = 60.0
-#: Where the bones of a T-pose point, in the body frame, left side.
+#: Directions of bones in a T-pose, in the body frame, left side.
 _LEFT, _DOWN, _FORWARD = np.eye(3)[0], -np.eye(3)[1], np.eye(3)[2]
 _THUMB = unit(np.array([0.65, -0.3, 0.7]))
 
@@ -61,7 +61,7 @@ def body_frame(places: Float[np.ndarray, "J 3"], roles: Roles) -> Float[np.ndarr
 
 
 def snapped(frame: Float[np.ndarray, "3 3"], within: float) -> Float[np.ndarray, "3 3"] | None:
-    """The rotation with axes along the world's that is nearest to a frame, if no axis is farther than ``within``."""
+    """The axis-aligned rotation nearest to a frame, if no axis is farther than ``within`` degrees; otherwise None."""
     near = np.zeros((3, 3))
     rows = np.argmax(np.abs(frame), axis=0)
     near[rows, range(3)] = np.sign(frame[rows, range(3)])
@@ -71,10 +71,10 @@ def snapped(frame: Float[np.ndarray, "3 3"], within: float) -> Float[np.ndarray,
 
 
 def oddness(places: Places, roles: Roles) -> Float[np.ndarray, "*t"]:
-    """How far poses are, in degrees, from a person who stands upright with straight limbs like in a mirror.
+    """Deviation of poses, in degrees, from a person standing upright and symmetric with straight limbs.
 
-    The worst of: legs out of line with the trunk, hips across the shoulders, arms to the front or the back or above
-    the head, unlike arms, bent elbows and knees. T-, A- and I-poses score near 0.
+    The largest of: legs out of line with the trunk, hips twisted against the shoulders, arms to the front or the back
+    or above the head, asymmetric arms, bent elbows and knees. It is near 0 for T-, A- and I-poses.
     """
     up, across = trunk_axis(places, roles), unit(_across(places, roles))
     forward = unit(np.cross(across, up))
@@ -103,7 +103,7 @@ def anatomy(
     body: Float[np.ndarray, "3 3"],
     roles: Roles,
 ) -> Float[np.ndarray, "J 3 3"]:
-    """``R_joint_anatomy`` of every joint; one without a part in the body follows its parent.
+    """``R_joint_anatomy`` of every joint; a joint without a role follows its parent.
 
     Args:
         places: positions in the reference pose.
@@ -133,7 +133,7 @@ class _Pose:
         return vector if np.linalg.norm(vector) > 1e-5 else None
 
     def tip(self, role: str) -> Float[np.ndarray, "3"] | None:
-        """From a part to its end site, or to the child whose branch reaches farthest (the middle finger of a hand)."""
+        """Vector from a part to its end site, or to the child with the longest branch (the middle finger of a hand)."""
         joint, skeleton = self.roles[role], self.skeleton
         points = [(self.world[joint] @ np.asarray(end),) * 2 for owner, end in skeleton.ends if owner == joint]
         branch = {joint: joint}
@@ -189,14 +189,14 @@ def _turn(role: str, above: Float[np.ndarray, "3 3"], pose: _Pose) -> Float[np.n
 
 
 def _hinge(body, canonical, bends_to, upper, lower, straight):
-    """The turn of a limb's upper bone, its twist by the hinge below where that is bent enough to show."""
+    """The turn of a limb's upper bone, with the twist of the hinge below where that is bent enough to define it."""
     if upper is None or lower is None or not _SHOWS_HINGE < angle_between(upper, lower) < 180 - _SHOWS_HINGE:
         return straight
     return frame_of(upper, lower) @ frame_of(body @ canonical, body @ bends_to).T
 
 
 def _hand(side: str, out: Float[np.ndarray, "3"], above: Float[np.ndarray, "3 3"], pose: _Pose):
-    """A hand points to its middle finger; the knuckles tell how it is rolled."""
+    """The turn of a hand: direction from the middle finger, roll from the knuckles."""
     wrist = f"{side}_Wrist"
     bases = {
         finger: bone
@@ -206,20 +206,23 @@ def _hand(side: str, out: Float[np.ndarray, "3"], above: Float[np.ndarray, "3 3"
     if not bases:
         ends = pose.tip(wrist)
         forearm = above @ pose.body @ out
-        # Writers invent ends where there were none, and these point anywhere.
+        # Some writers add end sites of arbitrary direction.
         if ends is None or angle_between(forearm, ends) > _BENT_HAND:
             return above
         return shortest_turn(forearm, ends) @ above
     points = bases.get("Middle", sum(bases.values(), np.zeros(3)) / len(bases))
     last = next((bases[finger] for finger in ("Pinky", "Ring") if finger in bases), None)
     if "Index" in bases and last is not None and angle_between(points, bases["Index"] - last) > 20:
-        known = frame_of(points, bases["Index"] - last)
-        return known @ frame_of(pose.body @ out, pose.body @ _FORWARD).T
+        frame = frame_of(points, bases["Index"] - last)
+        return frame @ frame_of(pose.body @ out, pose.body @ _FORWARD).T
     return shortest_turn(above @ pose.body @ out, points) @ above
 
 
 def _foot(bone: Float[np.ndarray, "3"] | None, body: Float[np.ndarray, "3 3"], sloped: bool):
-    """Feet stand flat in the reference pose and turn out as drawn, except where the drawing ignores the sole."""
+    """The turn of a foot: flat on the ground in the reference pose, heading and slope of its bone.
+
+    A bone that does not follow the sole has the usual slope.
+    """
     up = body[:, 1]
     if bone is None or angle_between(bone, up) < 10 or angle_between(bone, -up) < 10:
         return np.eye(3)
@@ -253,11 +256,11 @@ def ankle_height(
 ) -> float:
     """Height of the ankles above the lowest joint or end site of flat feet.
 
-    Where the foot is drawn without regard to the sole, from the usual slope of a foot.
+    Where the foot bone does not follow the sole, from the usual slope of a foot.
 
     Args:
         places: positions in the reference pose, in the body frame.
-        world: orientations there.
+        world: orientations in the reference pose, in the body frame.
     """
     heights = []
     for side in "LR":

@@ -1,4 +1,4 @@
-"""What retargeting knows about a rig: its joints' parts in the body, reference pose, axes and unit."""
+"""Rigs analysed for retargeting: body parts, reference pose, axes and unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,21 +7,16 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import path_up
-from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.parts import assign_sides, find_parts, trunk_chains
 from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_places, world_rotations
 from a2g_jax.geometry.retarget.rest import anatomy, body_frame, oddness, snapped, trunk_axis
-from a2g_jax.geometry.retarget.topology import joints_by_shape
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: Parts without which there is nothing to retarget.
-_NEEDED = tuple(f"{side}_{part}" for side in "LR" for part in ("Shoulder", "Elbow", "Wrist"))
-_LIMBS = (("Shoulder", "Elbow", "Wrist", "Collar"), ("Hip", "Knee", "Ankle", "Foot"))
-#: A pose of this oddness or less (degrees) is a T-, A- or I-pose; a zero pose, meant to be one, may be a bit worse.
+#: Largest oddness (degrees) of a T-, A- or I-pose, of a zero pose, and of any other reference pose.
 _GOOD_POSE, _ZERO_POSE, _WORST_POSE = 15.0, 40.0, 75.0
 _AXES = {"X": 0, "Y": 1, "Z": 2}
-#: Metres in a unit, and the factor that mends lengths read in metres or centimetres when the file meant it.
+#: Units, and the factor that corrects lengths that were read as metres or centimetres.
 _UNITS = (("metres", 1.0), ("inches", 2.54), ("millimetres", 0.1), ("feet", 0.3048), ("decimetres", 10.0))
 _ADULT = (1.2, 2.3)
 #: An adult's height over the length of the arm without the hand (Drillis and Contini 1966: 0.186 + 0.146 of height).
@@ -30,26 +25,26 @@ _ARMS_IN_HEIGHT = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A skeleton understood as a person; see :mod:`a2g_jax.geometry.retarget.rest` for the frames."""
+    """A skeleton with the parts of a body; :mod:`a2g_jax.geometry.retarget.rest` defines the frames."""
 
     skeleton: Skeleton
     roles: dict[str, int]
     """Joint of each part: ``Pelvis``, ``L_Hip`` ... ``R_Wrist``, ``Neck``, ``Head``, ``Chest``, ``L_Index1`` ..."""
     spine: tuple[int, ...]
-    """Joints above the pelvis up to the chest, which carries the collars."""
+    """Joints above the pelvis up to the chest, the parent of the collars."""
     neck: tuple[int, ...]
     """Joints between chest and head."""
     by_shape: bool
-    """Whether the parts were found by topology and not by names."""
+    """Whether parts were found by topology instead of names."""
     rest: Float[np.ndarray, "J 3 3"]
     """Local rotations of the reference pose."""
     align: Float[np.ndarray, "J 3 3"]
     """``R_joint_anatomy`` of every joint."""
     world: Float[np.ndarray, "3 3"]
-    """``R_world_body`` of a person who faces forward in the world of the rig's motions: columns left, up, forward."""
+    """``R_world_body`` of a person facing forward in the world of the rig's motions: columns left, up, forward."""
     height: float
-    """From the lowest point to the highest of the reference pose, along the body, as read (metres if rightly read);
-    of a rig without legs, what an adult with such arms has."""
+    """Height of the reference pose along the body, in the unit as read (metres if read correctly); of a rig without
+    legs, that of an adult with such arms."""
     notes: tuple[str, ...]
     """How the reference pose, the axes and the unit were found."""
 
@@ -60,7 +55,7 @@ class Rig:
 
     @property
     def unit_factor(self) -> float:
-        """What lengths must be multiplied by to be metres: 1 unless the file was in an unusual unit."""
+        """Factor from the unit as read to metres: 1 unless the file has an unusual unit."""
         return _guess_unit(self.height)[1]
 
     @property
@@ -80,31 +75,32 @@ def find_rig(
     """Find the body in a rig.
 
     Parts are found by names; where these do not give both arms, by topology and bone lengths. The reference pose is
-    the zero pose of the file if that shows a standing person, or else the frame of the motion that does best.
+    the zero pose of the file if that is a standing person, or else the frame of the motion nearest to one.
 
     Args:
-        source: a motion, or only its skeleton; the motion also tells which way is up and can lend a reference pose.
-        name: how errors call it, such as the file's name.
+        source: a motion, or only its skeleton; a motion also gives the vertical axis and candidates for the reference
+            pose.
+        name: what errors call the rig, such as its file name.
         rest: ``"auto"``, ``"zero"`` for the zero pose, or the number of a frame.
         up: the vertical axis of the rig's motions, such as ``"Z"`` or ``"-Y"``; None finds it.
         joints: parts given by hand, such as ``{"L_Elbow": "joint17"}``; they come before what is found.
 
     Raises:
-        InputError: no two arms are found, or no pose shows a standing person.
+        InputError: no two arms are found, or no pose is that of a standing person.
     """
     skeleton = source if isinstance(source, Skeleton) else source.skeleton
     motion = None if isinstance(source, Skeleton) else source
-    roles, untold = _find_roles(skeleton, name, joints or {})
-    by_shape = untold is not None
+    roles, unsided = find_parts(skeleton, name, joints or {})
+    by_shape = unsided is not None
     local, notes = _reference_pose(skeleton, motion, roles, rest, name)
     world = world_rotations(local, skeleton.parents)
     places = joint_places(world, np.asarray(skeleton.offsets, np.float64), skeleton.parents)
-    if untold:
-        roles = _tell_sides(roles, untold, places, name)
+    if unsided:
+        roles = assign_sides(roles, unsided, places, name)
     body = body_frame(places, roles)
     body = _upright(body, drawn="zero pose" in notes[0])
     axes = _world_axes(motion, roles, body, up, name)
-    spine, neck = _trunk(skeleton, roles)
+    spine, neck = trunk_chains(skeleton, roles)
     heights = places @ body[:, 1]
     height = float(heights.max() - heights.min())
     if "L_Ankle" not in roles or "R_Ankle" not in roles:
@@ -114,119 +110,6 @@ def find_rig(
     notes += (f"{height:.2f} tall: lengths are {'right in metres' if factor == 1 else f'{unit}, times {factor}'}",)
     align = anatomy(skeleton, places, world, body, roles)
     return Rig(skeleton, roles, spine, neck, by_shape, local, align, axes, height, notes)
-
-
-def _find_roles(
-    skeleton: Skeleton, name: str, given: Mapping[str, str]
-) -> tuple[dict[str, int], list[tuple[str, ...]] | None]:
-    """Joints by part, and the limbs (from topology) whose sides are still to be told apart; None: all by name."""
-    fixed = {}
-    for role, joint in given.items():
-        if joint not in skeleton.names:
-            raise InputError(f"{name}: has no joint {joint!r} for {role}; it has {', '.join(skeleton.names)}.")
-        fixed[role] = skeleton.index(joint)
-    taken = set(fixed.values())
-    roles = {role: joint for role, joint in named_joints(skeleton.names).items() if joint not in taken} | fixed
-    untold = None
-    if missing := [role for role in _NEEDED if role not in roles]:
-        shape = joints_by_shape(skeleton)
-        if shape is None:
-            raise InputError(
-                f"{name}: no {', no '.join(missing)} found, neither by names nor by the shape of the tree; name the "
-                f"joints in the usual way or give them by hand. It has {', '.join(skeleton.names[:30])}"
-                f"{' ...' if skeleton.joints > 30 else ''}."
-            )
-        roles, untold = _with_names(shape, roles)
-    _complete(skeleton, roles)
-    for side in "LR":
-        _check_chain(skeleton, roles, [f"{side}_Shoulder", f"{side}_Elbow", f"{side}_Wrist"], name)
-        legs = [role for part in ("Hip", "Knee", "Ankle", "Foot") if (role := f"{side}_{part}") in roles]
-        _check_chain(skeleton, roles, legs, name)
-    return roles, untold
-
-
-def _with_names(shape: dict[str, int], named: dict[str, int]) -> tuple[dict[str, int], list[tuple[str, ...]]]:
-    """Parts by topology, corrected by the names there are, and the limbs whose sides no name tells."""
-    untold: list[tuple[str, ...]] = []
-    for parts in _LIMBS:
-        votes = 0
-        for side, other in ("LR", "RL"):
-            for part in parts:
-                joint = named.get(f"{side}_{part}")
-                votes += (joint is not None) * (shape.get(f"{side}_{part}") == joint)
-                votes -= (joint is not None) * (shape.get(f"{other}_{part}") == joint)
-        if votes < 0:
-            shape = _swapped(shape, parts)
-        if votes == 0 and f"L_{parts[0]}" in shape:
-            untold.append(parts)
-    return shape | named, untold
-
-
-def _swapped(roles: dict[str, int], parts: tuple[str, ...]) -> dict[str, int]:
-    """Left and right of a limb exchanged."""
-    swap = {"L": "R", "R": "L"}
-    changed = {f"{swap[s]}_{part}": roles[f"{s}_{part}"] for s in "LR" for part in parts if f"{s}_{part}" in roles}
-    return {role: joint for role, joint in roles.items() if role[2:] not in parts} | changed
-
-
-def _complete(skeleton: Skeleton, roles: dict[str, int]) -> None:
-    """Parts that follow from others: the chest, the pelvis, collars without a usual name."""
-    parents = skeleton.parents
-    roles["Chest"] = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
-    if "L_Hip" in roles and "R_Hip" in roles:
-        fork = _common(parents, roles["L_Hip"], roles["R_Hip"])
-        low = _common(parents, fork, roles["Chest"])
-        pelvis = roles.get("Pelvis")
-        if pelvis is None or any(path_up(parents, roles[part], pelvis) is None for part in ("Chest", "L_Hip", "R_Hip")):
-            roles["Pelvis"] = low
-    elif "Pelvis" in roles and path_up(parents, roles["Chest"], roles["Pelvis"]) is None:
-        del roles["Pelvis"]
-    for side in "LR":
-        above = path_up(parents, roles[f"{side}_Shoulder"], roles["Chest"]) or []
-        if roles.get(f"{side}_Collar") not in above:
-            roles.pop(f"{side}_Collar", None)
-            if above:
-                roles[f"{side}_Collar"] = above[-1]
-    for role in ("Neck", "Head"):
-        if role in roles and path_up(parents, roles[role], roles["Chest"]) is None:
-            # A neck below the fork of the arms is the chest by another name.
-            del roles[role]
-
-
-def _check_chain(skeleton: Skeleton, roles: dict[str, int], chain: list[str], name: str) -> None:
-    for upper, lower in zip(chain, chain[1:], strict=False):
-        if path_up(skeleton.parents, roles[lower], roles[upper]) is None:
-            names = skeleton.names[roles[lower]], skeleton.names[roles[upper]]
-            raise InputError(
-                f"{name}: {lower} ({names[0]}) does not hang below {upper} ({names[1]}); give both by hand."
-            )
-
-
-def _trunk(skeleton: Skeleton, roles: dict[str, int]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    parents, chest = skeleton.parents, roles["Chest"]
-    if "Pelvis" not in roles:
-        spine = [chest]
-        while parents[spine[-1]] >= 0:
-            spine.append(parents[spine[-1]])
-    elif roles["Pelvis"] == chest:
-        spine = []
-    else:
-        spine = [chest, *(path_up(parents, chest, roles["Pelvis"]) or [])]
-    neck = []
-    if "Head" in roles:
-        neck = path_up(parents, roles["Head"], chest) or []
-    elif "Neck" in roles:
-        neck = [roles["Neck"]]
-        for joint, parent in enumerate(parents):
-            if parent == neck[0] and parse_name(skeleton.names[joint]).base.startswith("neck"):
-                neck.insert(0, joint)
-    if neck and "Neck" in roles and roles["Neck"] in neck:
-        # What lies between the fork of the arms and the neck by name is spine.
-        cut = neck.index(roles["Neck"]) + 1
-        neck, spine = neck[:cut], [*neck[cut:], *spine]
-    elif neck:
-        roles["Neck"] = neck[-1]
-    return tuple(reversed(spine)), tuple(reversed(neck))
 
 
 def _reference_pose(
@@ -245,16 +128,16 @@ def _reference_pose(
     if motion is None or motion.frames == 0:
         raise InputError(
             f"{name}: the zero pose of the skeleton is no standing person ({odd:.0f} degrees off); "
-            "give a motion on it that shows one, or say which frame does."
+            "give a motion with such a pose, or the number of its frame."
         )
     rows = np.unique(np.linspace(0, motion.frames - 1, 2000).astype(int))
     rotations = np.asarray(motion.rotations)[rows].astype(np.float64)
     scores = oddness(_places(skeleton, rotations), roles)
-    # The first frame is where a T-pose stands if there is one.
+    # A T-pose, where there is one, is the first frame.
     best = 0 if scores[0] <= _GOOD_POSE else int(np.argmin(scores))
     if scores[best] > min(odd, _WORST_POSE):
         raise InputError(
-            f"{name}: neither the zero pose nor a frame shows a person standing with straight limbs (best: frame "
+            f"{name}: neither the zero pose nor a frame is a person standing with straight limbs (best: frame "
             f"{rows[best]}, {scores[best]:.0f} degrees off); add a T-pose as first frame or name a frame."
         )
     note = f"reference: frame {rows[best]} ({scores[best]:.0f} degrees from upright with straight limbs)"
@@ -267,9 +150,9 @@ def _places(skeleton: Skeleton, rotations: Float[np.ndarray, "*t J 3 3"]) -> Flo
 
 
 def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "3 3"]:
-    """The body frame along the world's axes where it nearly is: who poses stands upright.
+    """The body frame, aligned with the world's axes where it nearly is, since a posing person stands upright.
 
-    A drawn pose faces along an axis as well; a captured person may face anywhere.
+    A modelled pose (``drawn``) also faces along an axis; a captured person may face anywhere.
     """
     axes = snapped(body, 15.0)
     if axes is None or drawn:
@@ -280,25 +163,10 @@ def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "
     return np.stack([frame[:, 1], frame[:, 0], np.cross(frame[:, 1], frame[:, 0])], axis=1)
 
 
-def _tell_sides(
-    roles: dict[str, int], untold: list[tuple[str, ...]], places: Float[np.ndarray, "J 3"], name: str
-) -> dict[str, int]:
-    """Toes point forward; left is then up times forward."""
-    feet = [s for s in "LR" if f"{s}_Foot" in roles and f"{s}_Ankle" in roles]
-    if not feet:
-        raise InputError(f"{name}: names tell nothing and there are no toes to tell left from right; give the joints.")
-    forward = sum((places[roles[f"{s}_Foot"]] - places[roles[f"{s}_Ankle"]] for s in feet), np.zeros(3))
-    left = np.cross(trunk_axis(places, roles), forward)
-    for parts in untold:
-        if left @ (places[roles[f"L_{parts[0]}"]] - places[roles[f"R_{parts[0]}"]]) < 0:
-            roles = _swapped(roles, parts)
-    return roles
-
-
 def _world_axes(
     motion: Motion | None, roles: dict[str, int], body: Float[np.ndarray, "3 3"], up: str | None, name: str
 ) -> Float[np.ndarray, "3 3"]:
-    """Left, up and forward in the world of the motion; forward as drawn where the drawing stands upright in it."""
+    """Left, up and forward in the world of the motion; forward as in the reference pose where that is upright in it."""
     vertical = body[:, 1]
     if motion is not None and motion.frames and up is None:
         rows = np.unique(np.linspace(0, motion.frames - 1, 200).astype(int))
@@ -319,7 +187,7 @@ def _world_axes(
 
 
 def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> float:
-    """From shoulder over elbow to wrist, the mean of both sides."""
+    """Length from shoulder over elbow to wrist, the mean of both sides."""
     chain = ("Shoulder", "Elbow", "Wrist")
     bones = [
         places[roles[f"{side}_{end}"]] - places[roles[f"{side}_{start}"]]
@@ -330,7 +198,7 @@ def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> floa
 
 
 def _guess_unit(height: float) -> tuple[str, float]:
-    # The reader takes lengths for metres or centimetres; what then is no adult was in another unit.
+    # The reader assumes metres or centimetres; a height that is no adult's means another unit.
     if _ADULT[0] <= height <= _ADULT[1] or height <= 0:
         return _UNITS[0]
     return min(_UNITS, key=lambda unit: abs(np.log(height * unit[1] / 1.7)))
@@ -339,13 +207,3 @@ def _guess_unit(height: float) -> tuple[str, float]:
 def _axis_name(vector: Float[np.ndarray, "3"]) -> str:
     axis = int(np.argmax(np.abs(vector)))
     return f"{'+' if vector[axis] > 0 else '-'}{'XYZ'[axis]}"
-
-
-def _common(parents: tuple[int, ...], first: int, second: int) -> int:
-    """The lowest joint that both hang from; one may hang from the other."""
-    while first != second:
-        if first > second:
-            first = parents[first]
-        else:
-            second = parents[second]
-    return first

@@ -1,4 +1,4 @@
-"""Skeletons to retarget to that keep a person's own proportions."""
+"""Standard skeletons with the proportions of a rig, as targets of retargeting."""
 
 import numpy as np
 from jaxtyping import Float
@@ -8,17 +8,17 @@ from a2g_jax.geometry.retarget.poses import joint_places
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 
-#: Where parts that a rig lacks are put: the collar between chest and shoulder, the ball of the foot from the ankle and
-#: the head from the neck as shares of the length of a leg and of the trunk.
+#: Default positions of parts that a rig lacks: the collar as a share of the way from chest to shoulder, the ball of the
+#: foot from the ankle and the head from the neck as shares of the length of a leg and of the trunk.
 _COLLAR, _BALL, _HEAD = 0.3, (0.0, -0.08, 0.17), (0.0, 0.2, 0.03)
 _METACARPALS = ("Ring", "Pinky", "Index")
 _CARRIERS = {"Pinky": "Ring", "Thumb": "Index"}
 
 
 def body_skeleton(rig: Rig) -> Skeleton:
-    """The 22 body joints with the bones of a rig: Y-up, T-pose, metres (mended by the rig's unit).
+    """The 22 body joints with the bones of a rig: Y-up, T-pose, metres (corrected by the rig's unit).
 
-    Spines are placed as they are counted; a collar, a neck, a head or toes that the rig lacks come from proportions.
+    Spines are placed by order; a collar, a neck, a head or toes that the rig lacks are placed by proportions.
 
     Raises:
         InputError: the rig has no legs.
@@ -29,7 +29,7 @@ def body_skeleton(rig: Rig) -> Skeleton:
     for number in range(3):
         at = number * (count - 1) / 2
         low, high = (rig.spine[int(f(at))] if count else rig.roles["Chest"] for f in (np.floor, np.ceil))
-        # Of more than three, one that exists; of two, the middle between.
+        # Of three or more, an existing joint; of two, also their midpoint.
         whole = rig.spine[int(np.floor(at + 0.5))] if count >= 3 else None
         point = (person.places[low] + person.places[high]) / 2 if whole is None else person.places[whole]
         if count <= 1:
@@ -64,7 +64,7 @@ def body_skeleton(rig: Rig) -> Skeleton:
 def upper_body_skeleton(rig: Rig) -> Skeleton:
     """BEAT's 47 upper-body joints with the bones of a rig: names and order of BEAT's files, Y-up, T-pose, metres.
 
-    ``Spine``, the root, is the rig's chest. Palm joints that the rig lacks lie at the wrist and never turn.
+    ``Spine``, the root, is the rig's chest. Palm joints that the rig lacks are at the wrist, without rotation.
 
     Raises:
         InputError: the rig has no fingers, or an arm without a collar.
@@ -115,17 +115,17 @@ class _Person:
         self.body = self.frames[rig.roles["Chest"]]
 
     def hips(self) -> Float[np.ndarray, "3"]:
-        """The pelvis; the middle of the hips where the rig has none between them and the spine."""
+        """Position of the pelvis; the midpoint of the hips where no joint lies between them and the spine."""
         roles = self.rig.roles
         missing = [f"{s}_{p}" for s in "LR" for p in ("Hip", "Knee", "Ankle") if f"{s}_{p}" not in roles]
         if missing:
-            raise InputError(f"The rig lacks {', '.join(missing)}: no full body can be made of it.")
+            raise InputError(f"The rig lacks {', '.join(missing)}: it gives no full body; give the joints by hand.")
         if roles.get("Pelvis", roles["Chest"]) != roles["Chest"]:
             return self.places[roles["Pelvis"]]
         return (self.places[roles["L_Hip"]] + self.places[roles["R_Hip"]]) / 2
 
     def tip(self, joint: int) -> tuple[float, float, float] | None:
-        """The farthest point below a joint, in its anatomical frame."""
+        """Position of the farthest point below a joint, in its anatomical frame."""
         skeleton, below = self.rig.skeleton, {joint}
         points = []
         for other, parent in enumerate(skeleton.parents):

@@ -1,8 +1,8 @@
-"""Finding a body by the shape of its tree, where names tell nothing.
+"""Body parts from the shape of a joint tree, for rigs whose names give none.
 
-A body is a tree with two pairs of like branches: the legs at the pelvis and, above it, the arms at the chest, which
-also carries the neck. Within a limb the two long bones in a row of like length are known by their lengths. None of
-this depends on the pose; only which side is the left one does, and that is left to the caller.
+A body is a tree with two pairs of similar branches: the legs at the pelvis and, above it, the arms at the chest, where
+the neck begins as well. Within a limb, the two long bones are identified by their lengths. None of this depends on the
+pose, except which side is the left one; that is left to the caller.
 """
 
 import itertools
@@ -12,18 +12,18 @@ from jaxtyping import Float
 
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: Joint counts of two branches must be equal and their lengths alike up to this share.
+#: Similar branches have equal joint counts, and lengths that differ by at most this share.
 _ALIKE = 0.15
 #: Upper arm over forearm, thigh over shin: human proportions (Winter 2009, Biomechanics and Motor Control, Fig. 4.1).
 _ARM_RATIO, _LEG_RATIO = 1.2, 1.0
 
 
 def joints_by_shape(skeleton: Skeleton) -> dict[str, int] | None:
-    """Joints of a body from topology and bone lengths alone, or None where there are not two arms.
+    """Joints of a body from topology and bone lengths alone; None without two arms.
 
     Returns:
         Roles as :func:`~a2g_jax.geometry.joint_names.named_joints` gives them, without fingers. "L" and "R" are the
-        two sides, not yet told apart.
+        two sides in arbitrary order.
     """
     tree = _Tree(skeleton)
     pairs = [(joint, pair) for joint in range(skeleton.joints) if (pair := tree.pair(joint)) is not None]
@@ -69,7 +69,7 @@ class _Tree:
             self.reach[joint] = self.lengths[joint] + tip
 
     def pair(self, joint: int) -> tuple[int, int] | None:
-        """The two largest like branches below a joint, if there are such of three joints or more each."""
+        """The two largest similar branches of three joints or more below a joint, or None."""
         best = None
         for first, second in itertools.combinations(self.children[joint], 2):
             alike = self.count[first] == self.count[second] >= 3 and all(
@@ -81,7 +81,7 @@ class _Tree:
         return best
 
     def chain(self, joint: int) -> list[int]:
-        """The joint and those below it along the farthest reach, up to a hand's fork or the end."""
+        """The joint and those below it along the longest branch, up to the fork of a hand or the end."""
         path = [joint]
         while self.children[path[-1]]:
             below = self.children[path[-1]]
@@ -96,7 +96,7 @@ class _Tree:
 
 
 def _chest_and_legs(tree: _Tree, pairs):
-    """Of all joints with like branches, the one that carries the arms and the one above it that carries the legs."""
+    """Of all joints with similar branches, the parent of the arms and, above it, that of the legs."""
 
     def above(joint: int, other: int) -> bool:
         while other > joint:
@@ -114,7 +114,7 @@ def _chest_and_legs(tree: _Tree, pairs):
 
 
 def _two_bones(tree: _Tree, chains: list[list[int]], ratio: float, least_tail: int) -> tuple[int, int, int] | None:
-    """Places in a chain of the joints above, between and below its two long bones, the same on both sides."""
+    """Indices in a chain of the joints above, between and below its two long bones, the same on both sides."""
     count = min(len(chain) for chain in chains)
     spans = [tree.spans(chain) for chain in chains]
     best, choice = np.inf, None
@@ -169,7 +169,7 @@ def _leg(tree: _Tree, chains: list[list[int]]) -> list[dict[str, int]] | None:
 def _neck_and_head(tree: _Tree, joint: int) -> dict[str, int]:
     chain = tree.chain(joint)
     last = chain[-1]
-    # A leaf that ends in itself marks the top of the head; eyes and a jaw hang on the head.
+    # A leaf without length marks the top of the head; eyes and a jaw are children of the head.
     if len(chain) >= 3 and not tree.children[last] and tree.ends.get(last, 0.0) < 1e-4:
         chain = chain[:-1]
     if len(chain) == 1:

@@ -1,15 +1,15 @@
-"""Moving one rig as another moves.
+"""Retargeting a motion from one rig to another.
 
-With the frames of :mod:`~a2g_jax.geometry.retarget.rest`, a joint ``t`` of the target takes the pose of its partner
+With the frames of :mod:`~a2g_jax.geometry.retarget.rest`, a joint ``t`` of the target copies the pose of its partner
 ``s`` in the source by
 
     R_world_t(time) = W @ R_world_s(time) @ A_s @ A_t^T,
 
 where ``A`` is ``R_joint_anatomy`` of either and ``W = R_targetworld_body @ R_sourceworld_body^T`` turns the source's
-world into the target's (Z-up to Y-up, say). Bones point where they pointed and are rolled as they were rolled, because
-the whole orientation is taken over and not a direction alone. The way back is the inverse, so every matched joint
-returns exactly. Positions follow from the hips ``h``: ``h_target = scale * W @ h_source + lift * up``, with the scale
-of the legs, so that feet that stand still do so on the target too as far as the proportions of the legs agree.
+world into the target's (Z-up to Y-up, say). Bones keep direction and roll, because whole orientations are copied and
+not only directions. Retargeting back is the inverse, exact for every matched joint. Positions follow from the hips
+``h``: ``h_target = scale * W @ h_source + lift * up``, with the scale of the legs, so that feet standing still do so on
+the target too, as far as the proportions of the legs agree.
 """
 
 from dataclasses import replace
@@ -30,15 +30,15 @@ def retarget(motion: Motion, target: Rig | Skeleton | Match, *, source: Rig | No
 
     Args:
         motion: on any humanoid rig.
-        target: the rig to move. A skeleton is searched by :func:`~a2g_jax.geometry.retarget.find_rig`, whose options
-            a rig found before can carry; a match made before saves the search.
+        target: the target skeleton, or its rig (from :func:`~a2g_jax.geometry.retarget.find_rig`, with options of its
+            own), or a match (from :func:`~a2g_jax.geometry.retarget.match_rigs`).
         source: the rig of ``motion``, if found before.
 
     Returns:
         Float32 motion on the target's skeleton. Lengths scale by leg length; soles keep their height above the ground.
 
     Raises:
-        InputError: a rig is not understood; the message names what was not found.
+        InputError: a rig is not recognised; the message names what was not found.
     """
     if isinstance(target, Match):
         match = target
@@ -47,7 +47,9 @@ def retarget(motion: Motion, target: Rig | Skeleton | Match, *, source: Rig | No
         target = find_rig(target, name="the target") if isinstance(target, Skeleton) else target
         match = match_rigs(source, target)
     if not motion.skeleton.same_tree(match.source.skeleton):
-        raise InputError("The motion is on another skeleton than the source rig that it was matched with.")
+        raise InputError(
+            "The motion and the source rig of the match have different skeletons; match the rig of this motion."
+        )
     theirs = world_rotations(np.asarray(motion.rotations, np.float32), match.source.skeleton.parents)
     world = _target_world(match, theirs)
     skeleton = match.target.skeleton
@@ -64,8 +66,8 @@ def _target_world(match: Match, world: Float[np.ndarray, "T J 3 3"]) -> Float[np
     result = np.zeros((len(world), target.skeleton.joints, 3, 3), np.float32)
     ours = [pair.target for pair in match.pairs]
     theirs = [pair.source for pair in match.pairs]
-    onto = (source.align[theirs] @ np.swapaxes(target.align[ours], -1, -2)).astype(np.float32)
-    result[:, ours] = turn.astype(np.float32) @ (world[:, theirs] @ onto)
+    source_to_target = (source.align[theirs] @ np.swapaxes(target.align[ours], -1, -2)).astype(np.float32)
+    result[:, ours] = turn.astype(np.float32) @ (world[:, theirs] @ source_to_target)
     shares = {share.target: share for share in match.shares}
     matched, align, rest = set(ours), target.align.astype(np.float32), target.rest.astype(np.float32)
     moved: set[int] = set()
@@ -81,7 +83,7 @@ def _target_world(match: Match, world: Float[np.ndarray, "T J 3 3"]) -> Float[np
             result[:, joint] = result[:, parent] @ rest[joint]
             moved.add(joint)
         else:
-            # Nothing above moves: stand upright.
+            # No joint above is matched: upright.
             result[:, joint] = (target.world @ target.align[joint].T).astype(np.float32)
     return result
 
@@ -95,12 +97,12 @@ def _root(
     from_root = joint_places(theirs, np.asarray(source.skeleton.offsets), source.skeleton.parents)
     place = from_root[:, anchors[0]].mean(axis=1) + np.asarray(motion.root)
     ours = joint_places(world, np.asarray(target.skeleton.offsets), target.skeleton.parents)
-    wanted = match.scale * (place @ turn.T) + match.lift * target.world[:, 1]
-    return (wanted - ours[:, anchors[1]].mean(axis=1)).astype(np.float32)
+    anchor = match.scale * (place @ turn.T) + match.lift * target.world[:, 1]
+    return (anchor - ours[:, anchors[1]].mean(axis=1)).astype(np.float32)
 
 
 def _anchors(match: Match) -> tuple[list[int], list[int]]:
-    """The joints whose middle is carried over: the hips, or the lowest matched joint of the trunk."""
+    """Joints whose midpoint is retargeted: the hips, or the lowest matched joint of the trunk."""
     source, target = match.source.roles, match.target.roles
     if all(role in roles for roles in (source, target) for role in ("L_Hip", "R_Hip")):
         return [source["L_Hip"], source["R_Hip"]], [target["L_Hip"], target["R_Hip"]]

@@ -1,6 +1,6 @@
-"""Readers of files that nobody vouches for: pickles, pyarrow payloads, LMDB and NumPy archives.
+"""Readers of untrusted files: pickles, pyarrow payloads, LMDB databases and NumPy archives.
 
-Nothing here runs what a file says. Each reader builds plain values only (numbers, text, bytes, lists, tuples,
+No reader executes anything from a file. Each builds plain values only (numbers, text, bytes, lists, tuples,
 dictionaries, sets and NumPy arrays), refuses everything else by name, and stops at :class:`Limits`.
 """
 

@@ -1,4 +1,4 @@
-"""NumPy types and arrays from descriptions in files."""
+"""NumPy types and arrays from their descriptions in files."""
 
 import math
 import re
@@ -13,13 +13,13 @@ _MOST_AXES = 32
 
 
 def plain_type(text: object, budget: Budget, at: int, objects: bool = False) -> np.dtype:
-    """The NumPy type that ``text`` (as ``<f8``) names: a number, a truth value or text of fixed width.
+    """The NumPy type with the description ``text`` (such as ``<f8``): numbers, booleans or text of fixed width.
 
     Args:
-        objects: whether ``O`` is one too.
+        objects: whether Python objects (``O``) are allowed.
 
     Raises:
-        InputError: it is another: records, dates, long doubles, nothing that NumPy knows.
+        InputError: any other type, such as records, dates and long doubles, or an invalid description.
     """
     if isinstance(text, str) and len(text) < 16:
         if _TYPE.fullmatch(text):
@@ -30,10 +30,10 @@ def plain_type(text: object, budget: Budget, at: int, objects: bool = False) -> 
 
 
 def check_shape(shape: object, budget: Budget, at: int) -> tuple[int, ...]:
-    """``shape`` as a tuple of sizes that an array can have.
+    """``shape`` as a tuple of valid sizes.
 
     Raises:
-        InputError: not a tuple of whole numbers, negative, or too many elements.
+        InputError: not a tuple of whole numbers, a negative size, or too many elements.
     """
     if isinstance(shape, int) and not isinstance(shape, bool):
         shape = (shape,)
@@ -50,37 +50,37 @@ def plain_array(
     """A writable array of ``shape`` from its raw bytes.
 
     Args:
-        order: ``"C"`` or ``"F"``: whether the last or the first axis runs fastest in ``data``.
+        order: ``"C"`` or ``"F"``: whether the last or the first axis varies fastest in ``data``.
 
     Raises:
-        InputError: too few or too many bytes, truth values other than 0 and 1, or text that is no Unicode.
+        InputError: too few or too many bytes, booleans other than 0 and 1, or text that is not Unicode.
     """
     expected = math.prod(shape) * dtype.itemsize
     if dtype.hasobject or len(data) != expected:
-        raise budget.damage(at, f"{dtype} of shape {clip(shape)} takes {expected} bytes and {len(data)} are there")
+        raise budget.damage(at, f"{dtype} of shape {clip(shape)} takes {expected} bytes and has {len(data)}")
     budget.charge(expected + 128, at)
     if expected == 0:
         return np.empty(shape, dtype)
     flat = np.frombuffer(data, dtype).copy()
     if dtype.kind == "b" and flat.view(np.uint8).max() > 1:
-        raise budget.damage(at, "a truth value is neither 0 nor 1")
+        raise budget.damage(at, "a boolean is neither 0 nor 1")
     if dtype.kind == "U":
         points = flat.view(np.dtype(np.uint32).newbyteorder(dtype.byteorder))
         if points.max() > 0x10FFFF or np.any((points >= 0xD800) & (points <= 0xDFFF)):
-            raise budget.damage(at, "a letter is no Unicode")
+            raise budget.damage(at, "a character is not Unicode")
     return flat.reshape(shape, order="F" if order == "F" else "C")
 
 
 def object_array(items: list, shape: tuple[int, ...], order: str, budget: Budget, at: int) -> np.ndarray:
-    """An array of Python values.
+    """An array of Python objects.
 
     Raises:
-        InputError: their number is not that of the shape.
+        InputError: their number differs from that of the shape.
     """
     if len(items) != math.prod(shape):
         raise budget.damage(at, f"an array of shape {clip(shape)} comes with {len(items)} values")
     budget.charge(8 * len(items) + 128, at)
     flat = np.empty(len(items), object)
-    for index, item in enumerate(items):  # a slice would take lists apart
+    for index, item in enumerate(items):  # assigning a slice would unpack lists
         flat[index] = item
     return flat.reshape(shape, order="F" if order == "F" else "C")

@@ -1,9 +1,9 @@
-"""Values that ``pyarrow.serialize`` wrote, as in the TED data sets; pyarrow itself dropped it with version 12.
+"""Values written by ``pyarrow.serialize``, as in the TED data sets; pyarrow dropped the function in version 12.
 
-The bytes are the numbers of tensors and buffers, a record batch with the structure of the value (see
-:mod:`~a2g_jax.io.untrusted.arrow_batch`), and then the tensors and buffers one after the other, each from a multiple
-of 64 bytes on. This reads them without pyarrow: its reader of unions drops the None of files from before 1.0, and its
-C++ trusts offsets that a hostile file can choose.
+The data is the numbers of tensors and buffers, a record batch with the structure of the value (see
+:mod:`~a2g_jax.io.untrusted.arrow_batch`), and then the tensors and buffers in sequence, each aligned to 64 bytes. It is
+read without pyarrow, whose reader of unions drops the None of files from before 1.0, and whose C++ code trusts offsets
+that a hostile file can choose.
 
 Source: ``cpp/src/arrow/python/serialize.cc`` and ``deserialize.cc`` of Apache Arrow, and bytes written by pyarrow
 0.11.1, 0.13.0, 0.14.1, 0.15.1, 0.16.0, 0.17.1, 1.0.1, 6.0.1, 8.0.0 and 11.0.0.
@@ -24,25 +24,25 @@ from a2g_jax.io.untrusted.values import check_key, check_value
 
 _TENSORS_FROM = 64
 _MOST_BLOBS = 2**20
-#: What the elements of an array are of, by the kind of its type, where it was written as a list.
+#: Types of the elements of an array that was written as a list, by the kind of its NumPy type.
 _ELEMENTS: dict[str, tuple[type, ...]] = {
     "b": (bool,), "i": (int,), "u": (int,), "f": (int, float), "c": (), "S": (bytes,), "U": (str,),
 }  # fmt: skip
 
 
 def decode_arrow(data: bytes, name: str, limits: Limits | None = None) -> Any:
-    """The value that ``pyarrow.serialize`` (0.11 to 11) made these bytes of, without running any of it.
+    """Decode a value of ``pyarrow.serialize`` (0.11 to 11) without executing any of it.
 
-    The value is made of None, bool, int, float, float16, str, bytes, list, tuple, dict, set and NumPy arrays of plain
-    numbers and text. ``OrderedDict`` and ``Counter`` become dict, ``deque`` becomes list, and what was pickled inside
-    goes through :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`. Everything else is refused.
+    The value consists of None, bool, int, float, float16, str, bytes, list, tuple, dict, set and NumPy arrays of plain
+    numbers and text. ``OrderedDict`` and ``Counter`` become dict, ``deque`` becomes list, and pickled parts are decoded
+    as by :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`. Everything else is refused.
 
     Args:
         data: the bytes.
         name: what errors call them, such as the path and the key.
 
     Raises:
-        InputError: damaged, beyond the limits, or made of anything else.
+        InputError: damaged, beyond the limits, or with any other content.
     """
     budget = Budget(name, limits or Limits())
     try:
@@ -84,22 +84,22 @@ def _decode(data: bytes, budget: Budget) -> Any:
 
 
 def _has_long_head(data: bytes) -> bool:
-    """Whether the head is of 16 bytes (since 0.12) and not of 8: the next message or zeros tell."""
+    """Whether the head has 16 bytes (since 0.12) and not 8, as the next message or zeros show."""
     return data[16:20] == b"\xff\xff\xff\xff" or data[12:16] == b"\0\0\0\0"
 
 
 def _counts(counts: list[int], root: Sequence, budget: Budget) -> tuple[int, int]:
-    """How many arrays and buffers follow.
+    """Numbers of arrays and buffers that follow.
 
-    The head is (arrays, buffers) to 0.11; (tensors, arrays, buffers, nothing) to 0.15; and (tensors, sparse tensors,
-    arrays, buffers) after. The last two can look alike, so the columns say whether there are arrays.
+    The head is (arrays, buffers) to 0.11; (tensors, arrays, buffers, 0) to 0.15; and (tensors, sparse tensors, arrays,
+    buffers) since. The last two can be ambiguous; then the columns show whether there are arrays.
     """
     if len(counts) == 2:
         arrays, buffers = counts
         tensors = 0
     elif counts[1] or (counts[3] == 0 and counts[2] and not _has_arrays(root)):
-        tensors, arrays, buffers, nothing = counts
-        if nothing:
+        tensors, arrays, buffers, last = counts
+        if last:
             raise budget.error(0, f"holds sparse tensors, which are refused; {CONVERT}.")
     else:
         tensors, _, arrays, buffers = counts
@@ -115,7 +115,7 @@ def _has_arrays(sequence: Sequence) -> bool:
 
 
 class _Values:
-    """Builds values of columns, with the arrays and buffers that the columns speak of by number."""
+    """Builds values from columns, and from the arrays and buffers to which the columns refer by number."""
 
     def __init__(self, budget: Budget, at: int) -> None:
         self.budget = budget
@@ -126,10 +126,10 @@ class _Values:
     def items(self, sequence: Sequence, start: int, stop: int) -> list[Any]:
         self.budget.charge(64 * (stop - start), self.at)
         types, places = sequence.types[start:stop].tolist(), sequence.places[start:stop].tolist()
-        there = [1] * len(types) if sequence.valid is None else sequence.valid[start:stop].tolist()
+        valid = [1] * len(types) if sequence.valid is None else sequence.valid[start:stop].tolist()
         return [
-            self.item(sequence.children, kind, place) if is_there else None
-            for kind, place, is_there in zip(types, places, there, strict=True)
+            self.item(sequence.children, kind, place) if is_valid else None
+            for kind, place, is_valid in zip(types, places, valid, strict=True)
         ]
 
     def item(self, children: list[Child], kind: int, place: int) -> Any:
@@ -162,7 +162,7 @@ class _Values:
             blobs = self.arrays if kind == "ndarray" else self.buffers
             number = int(value)
             if not 0 <= number < len(blobs):
-                raise self.budget.damage(self.at, f"speaks of {kind} {number} and has {len(blobs)}")
+                raise self.budget.damage(self.at, f"refers to {kind} {number} and has {len(blobs)}")
             return blobs[number]
         return value if kind == "half" else value.item()
 
@@ -175,7 +175,7 @@ class _Values:
         return self.rebuilt(result) if "_pytype_" in result else result
 
     def rebuilt(self, stored: dict[Any, Any]) -> Any:
-        """What the default handlers of ``pyarrow.serialize`` wrote for types that Arrow has not."""
+        """The value of a type without an Arrow type, as the default handlers of ``pyarrow.serialize`` wrote it."""
         kind, data = stored["_pytype_"], stored.get("data")
         if stored.get("pickle") is True and type(data) is bytes:
             return decode_with(data, self.budget)

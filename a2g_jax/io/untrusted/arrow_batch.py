@@ -1,15 +1,15 @@
-"""The record batch in which ``pyarrow.serialize`` keeps the structure of a value, as columns.
+"""The record batch in which ``pyarrow.serialize`` stores the structure of a value, as columns.
 
-A sequence is a dense union: for each element the number of a child column and a place in it. There is a child for
+A sequence is a dense union: for each element the number of a child column and an index into it. There is a child for
 each type that occurs; lists, tuples and sets are list columns over a further union, and dictionaries are list columns
-over pairs of unions. How the children are told apart changed twice:
+over pairs of unions. The identification of the children changed twice:
 
 =============  =========================================================================================
 pyarrow        children
 =============  =========================================================================================
-to 0.11        named by nothing: the Arrow type tells; containers in a struct whose field is named ``list`` ...
-0.12 to 0.17   named by a number, ``0`` (bool) to ``15`` (buffer); None is a missing element of the union
-1.0 to 11      numbers one higher, after a child ``0`` of nulls, which stands for None
+to 0.11        without names: by the Arrow type; containers in a struct whose field is named ``list`` ...
+0.12 to 0.17   numbers as names, ``0`` (bool) to ``15`` (buffer); None is a missing element of the union
+1.0 to 11      numbers one higher, after a child ``0`` of nulls, for None
 =============  =========================================================================================
 """
 
@@ -53,7 +53,7 @@ _NUMBERS = {
 
 @dataclass
 class Sequence:
-    """Elements of mixed types: the child of each and its place there; ``valid`` is 0 for None."""
+    """Elements of mixed types: the child of each and the index into it; ``valid`` is 0 for None."""
 
     length: int
     valid: np.ndarray | None
@@ -66,8 +66,8 @@ class Sequence:
 class Child:
     """The elements of one type.
 
-    ``values`` holds numbers, or truth values; for text, bytes and containers ``bounds`` says where each begins and
-    the next one does, in ``content``, or in the sequences ``parts`` (two for dictionaries).
+    ``values`` holds numbers or booleans; for text, bytes and containers ``bounds`` holds the start of each element and
+    the end of the last one, in ``content`` or in the sequences ``parts`` (two for dictionaries).
     """
 
     kind: str
@@ -79,7 +79,7 @@ class Child:
 
 
 class BatchReader:
-    """Takes the columns of a batch apart, in the order in which their lengths and buffers follow each other."""
+    """Reads the columns of a batch, in the order of their lengths and buffers."""
 
     def __init__(self, message: Message, budget: Budget) -> None:
         self.body = message.body
@@ -107,12 +107,12 @@ class BatchReader:
         """Bytes of the next buffer: ``size`` of them, or all."""
         start, length = next(self.buffers, (-1, -1))
         if start < 0 or length < 0 or start + length > len(self.body) or (size or 0) > length:
-            raise self.budget.damage(self.at, "a buffer lies outside of its message, or is too short")
+            raise self.budget.damage(self.at, "a buffer is outside of its message, or too short")
         return self.body[start : start + (length if size is None else size)]
 
     def numbers(self, dtype: str, count: int) -> np.ndarray:
         data = self.buffer(count * np.dtype(dtype).itemsize)
-        self.budget.charge(len(data), self.at)  # columns may share a buffer, and each is looked through
+        self.budget.charge(len(data), self.at)  # columns may share a buffer, and each scans it
         return np.frombuffer(data, dtype)
 
     def bits(self, count: int, packed: memoryview | None = None) -> np.ndarray:
@@ -121,7 +121,7 @@ class BatchReader:
         return np.unpackbits(np.frombuffer(packed, np.uint8), count=count, bitorder="little")
 
     def validity(self, count: int) -> np.ndarray | None:
-        """Which elements are there; None where all are."""
+        """Which elements are present; None if all are."""
         packed = self.buffer()
         if len(packed) == 0:
             return None
@@ -130,7 +130,7 @@ class BatchReader:
         return self.bits(count, packed)
 
     def bounds(self, count: int) -> np.ndarray:
-        """Where each of ``count`` lists begins, and where the last one ends."""
+        """Starts of ``count`` lists, and the end of the last one."""
         if count == 0:
             self.buffer()
             return np.zeros(1, "<i4")
@@ -140,10 +140,10 @@ class BatchReader:
         return found
 
     def sequence(self, field: Table, depth: int = 0) -> Sequence:
-        """A union column and all below it.
+        """A union column with all columns below it.
 
         Raises:
-            InputError: damaged, nested too deeply, or with children that hold anything but plain values.
+            InputError: damaged, nested too deeply, or with anything but plain values.
         """
         if depth > self.budget.limits.depth:
             raise self.budget.error(self.at, f"is nested more than {self.budget.limits.depth} levels deep.")
@@ -155,7 +155,7 @@ class BatchReader:
         types, places = self.numbers("<i1", length), self.numbers("<i4", length)
         fields = field.tables(5)
         shift = 1 if fields and fields[0].number(2, "<B") == NULL else 0
-        # The union's own list of type numbers is in another order to 0.11; pyarrow never looked at it.
+        # The union's own list of type numbers has another order to 0.11; pyarrow never used it.
         return Sequence(length, valid, types, places, [self.child(part, shift, depth + 1) for part in fields])
 
     def child(self, field: Table, shift: int, depth: int) -> Child:
@@ -170,7 +170,7 @@ class BatchReader:
         if kind == "none":
             return Child(kind, self.node(missing=True))
         length = self.node()
-        self.buffer()  # which elements are there; node() has refused missing ones
+        self.buffer()  # the validity bits; node() has refused missing elements
         if kind == "bool":
             self.expect(field, BOOL)
             return Child(kind, length, values=self.bits(length))
@@ -185,7 +185,7 @@ class BatchReader:
             bounds = self.bounds(length)
             content = self.buffer()
             if bounds[-1] > len(content):
-                raise self.budget.damage(self.at, "a text reaches out of its buffer")
+                raise self.budget.damage(self.at, "a text exceeds its buffer")
             return Child(kind, length, bounds=bounds, content=content)
         self.expect(field, LIST)
         bounds = self.bounds(length)
@@ -203,11 +203,11 @@ class BatchReader:
                 raise self.budget.damage(self.at, "a dictionary without keys and values")
             parts = (self.sequence(pair[0], depth), self.sequence(pair[1], depth))
         if any(bounds[-1] > part.length for part in parts):
-            raise self.budget.damage(self.at, "a list reaches out of its items")
+            raise self.budget.damage(self.at, "a list exceeds its items")
         return Child(kind, length, bounds=bounds, parts=parts)
 
     def kind(self, field: Table, shift: int) -> str:
-        """What a child of a union holds, by its name, or its type in the oldest files."""
+        """Kind of the elements of a child of a union, by its name, or by its type in the oldest files."""
         name, type_number = field.text(0), field.number(2, "<B")
         if name.isascii() and name.isdigit():
             number = int(name[:4]) - shift

@@ -20,7 +20,7 @@ VERSION_5 = 4
 
 @dataclass
 class Message:
-    """One message: what kind it is, its metadata, and its body, which begins at byte ``start`` of the data."""
+    """One message: its kind, its metadata, and its body, which begins at byte ``start`` of the data."""
 
     kind: int
     version: int
@@ -30,7 +30,7 @@ class Message:
 
 
 class Stream:
-    """A place in the data, moving on message by message."""
+    """A position in the data that advances message by message."""
 
     def __init__(self, data: memoryview, budget: Budget) -> None:
         self.data = data
@@ -53,7 +53,7 @@ class Stream:
         self.at = math.ceil(self.at / size) * size
 
     def end_mark(self) -> None:
-        """Go past the end of a stream: four zero bytes, from 0.15 on after four of 255."""
+        """Skip the end of a stream: four zero bytes, since 0.15 after four of 255."""
         if self.data[self.at : self.at + 4] == b"\xff\xff\xff\xff":
             self.take(4)
         if self.number("<I"):
@@ -80,7 +80,7 @@ class Stream:
         """The next message as an array.
 
         Raises:
-            InputError: damaged, or of numbers that NumPy has not.
+            InputError: damaged, or of numbers without a NumPy type.
         """
         message = self.message(TENSOR)
         header, at = message.header, message.start
@@ -91,7 +91,7 @@ class Stream:
             raise self.budget.damage(at, "a tensor without data")
         offset, length = header.flat.read("<q", buffer), header.flat.read("<q", buffer + 8)
         if offset != 0 or length > len(message.body) or length < 0:
-            raise self.budget.damage(at, "a tensor lies outside of its message")
+            raise self.budget.damage(at, "a tensor is outside of its message")
         first, count = header.vector(3, 8)
         strides = tuple(header.flat.read("<q", first + 8 * axis) for axis in range(count))
         order = _order(shape, strides, dtype.itemsize)
@@ -115,7 +115,7 @@ def _number_type(header: Table, at: int, budget: Budget) -> np.dtype:
 
 
 def _order(shape: tuple[int, ...], strides: tuple[int, ...], width: int) -> str | None:
-    """Which axis runs fastest, by the steps from element to element; None where neither does."""
+    """Memory order by the strides: ``"C"``, ``"F"`` or None for neither."""
     if not strides or 0 in shape:
         return "C"
     if len(strides) != len(shape):

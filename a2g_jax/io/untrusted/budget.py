@@ -1,10 +1,10 @@
-"""What a file may make this package hold, and how a refusal reads."""
+"""Memory limits of untrusted files, and the messages of refusals."""
 
 from dataclasses import dataclass
 
 from a2g_jax.errors import InputError
 
-#: The mend that fits whatever is refused because of what it is, not because of damage.
+#: Remedy for content that is refused although the file is not damaged.
 CONVERT = "convert it where you trust it: load it there and save its arrays with numpy.savez"
 
 
@@ -13,8 +13,8 @@ class Limits:
     """Bounds on what one file, or one value of a database, may decode to.
 
     Attributes:
-        size: bytes of memory, roughly; what is shared within a value counts each time it is reached.
-        depth: containers within containers.
+        size: bytes of memory, roughly; a part that is shared within a value counts once for each reference.
+        depth: levels of nested containers.
     """
 
     size: int = 2 * 2**30
@@ -22,7 +22,7 @@ class Limits:
 
 
 class Budget:
-    """The memory that is left for one value, and the name that its errors carry."""
+    """Memory left for one value, and the name of its source for errors."""
 
     def __init__(self, name: str, limits: Limits) -> None:
         self.name = name
@@ -30,10 +30,10 @@ class Budget:
         self.left = limits.size
 
     def charge(self, size: int, at: int) -> None:
-        """Account for ``size`` more bytes, asked for at byte ``at`` of the data.
+        """Account for ``size`` more bytes, needed at byte ``at`` of the data.
 
         Raises:
-            InputError: that is more than the limit leaves.
+            InputError: the limit is exceeded.
         """
         self.left -= size
         if self.left < 0:
@@ -42,16 +42,16 @@ class Budget:
             )
 
     def error(self, at: int, message: str) -> InputError:
-        """The error that names the data, the byte and the fault."""
+        """An error that names the data, the byte and the fault."""
         return InputError(f"{self.name}, byte {at}: {message}")
 
     def damage(self, at: int, what: str) -> InputError:
-        """The error for data that contradicts itself or ends too early."""
+        """An error for data that is inconsistent or ends too early."""
         return self.error(at, f"is damaged ({what}); copy or download it again.")
 
 
 def clip(value: object, longest: int = 80) -> str:
-    """What a message shows of a value from a file: short, on one line, and never walking into containers."""
+    """A value from a file for a message: short, on one line, and without the content of containers."""
     if isinstance(value, str | bytes):
         shown = repr(value[:longest])
         return shown if len(shown) <= longest else shown[: longest - 3] + "..."

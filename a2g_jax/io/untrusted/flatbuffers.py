@@ -1,6 +1,6 @@
 """Reading FlatBuffers tables, the metadata of Arrow messages, with every offset checked.
 
-A table points back at a list of where its fields lie; strings, vectors and other tables are reached by offsets
+A table refers to a list with the offsets of its fields; strings, vectors and other tables are referred to by offsets
 (FlatBuffers, "Internals").
 """
 
@@ -12,7 +12,7 @@ _LONGEST_NAME = 256
 
 
 class FlatData:
-    """The bytes of one FlatBuffers message, which begin at byte ``base`` of the data that errors speak of."""
+    """The bytes of one FlatBuffers message, which begin at byte ``base`` of the data (for errors)."""
 
     def __init__(self, data: memoryview, base: int, budget: Budget) -> None:
         self.data = data
@@ -29,7 +29,7 @@ class FlatData:
 
 
 class Table:
-    """One table; fields are named by their place in the schema, and each lookup is bounds-checked."""
+    """One table; fields are numbered as in the schema, and every lookup is bounds-checked."""
 
     def __init__(self, flat: FlatData, at: int) -> None:
         self.flat = flat
@@ -38,7 +38,7 @@ class Table:
         self.fields_size = flat.read("<H", self.fields)
 
     def place(self, field: int) -> int | None:
-        """Where a field lies, or None where it is left out."""
+        """Position of a field, or None where it is absent."""
         entry = 4 + 2 * field
         if entry + 2 > self.fields_size:
             return None
@@ -58,18 +58,18 @@ class Table:
         return None if at is None else Table(self.flat, at)
 
     def vector(self, field: int, width: int) -> tuple[int, int]:
-        """Where the elements of a vector begin and how many there are, all within the message."""
+        """Position of the first element of a vector and their number, checked to be within the message."""
         at = self.pointed(field)
         if at is None:
             return 0, 0
         count = self.flat.read("<I", at)
         if at + 4 + count * width > len(self.flat.data):
-            raise self.flat.budget.damage(self.flat.base, f"a list of {count} elements reaches out of its message")
+            raise self.flat.budget.damage(self.flat.base, f"a list of {count} elements exceeds its message")
         return at + 4, count
 
     def text(self, field: int) -> str:
         start, count = self.vector(field, 1)
-        if count > _LONGEST_NAME:  # many fields may point at one name, and each reads it
+        if count > _LONGEST_NAME:  # many fields may refer to one name, and each reads it
             raise self.flat.budget.damage(self.flat.base, f"a name of {count} bytes")
         try:
             return bytes(self.flat.data[start : start + count]).decode("utf-8")

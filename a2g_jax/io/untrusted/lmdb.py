@@ -1,10 +1,9 @@
 """Reading LMDB databases (``data.mdb``) without LMDB.
 
-The C library trusts the file: it maps it and follows page numbers and offsets as they stand, so a hostile or damaged
-database can crash the process. The format is small enough to read with every step checked: two pages at the start
-say where the root of a B+ tree lies; its pages hold keys in order, and values or the numbers of further pages; large
-values lie in runs of pages of their own. Pages are read and not mapped, because a mapped file that somebody
-shortens kills the process too.
+The C library trusts the file: it maps it and follows page numbers and offsets without checks, so a hostile or damaged
+database can crash the process. The format is small enough to read with every step checked: two start pages refer to the
+root of a B+ tree; its pages hold keys in order, and values or the numbers of further pages; large values are stored in
+separate runs of pages. Pages are read and not mapped, because truncating a mapped file kills the process too.
 
 Source: the comments and structures of ``mdb.c`` (LMDB 0.9, data version 1; 64-bit, little-endian).
 """
@@ -54,8 +53,8 @@ class LmdbFile:
         limits: ``size`` bounds each value.
 
     Raises:
-        InputError: no such file, no database, or one with what no data set needs (several values for a key, keys in
-            another order, named databases). Damage is found, at the latest, when the page in question is read.
+        InputError: no such file, not a database, or one with features that no data set uses (several values for a key,
+            keys in another order, named databases). Damage is detected at the latest when the page is read.
     """
 
     def __init__(self, path: str | os.PathLike[str], limits: Limits | None = None) -> None:
@@ -79,14 +78,14 @@ class LmdbFile:
         return self._entries
 
     def close(self) -> None:
-        """Close the file; what was read stays."""
+        """Close the file; values that were read stay valid."""
         self._file.close()
 
     def items(self, start: bytes = b"") -> Iterator[tuple[bytes, bytes]]:
         """Keys and values in the order of the keys, from ``start`` on.
 
         Raises:
-            InputError: the file is damaged; entries before the damage have been given by then.
+            InputError: the file is damaged, after the entries before the damage.
         """
         for key, page, node in self._entries_from(start):
             yield key, self._value(page, node)
@@ -96,7 +95,7 @@ class LmdbFile:
         return (key for key, _, _ in self._entries_from(b""))
 
     def get(self, key: bytes) -> bytes | None:
-        """The value of a key; None where there is none."""
+        """The value of a key, or None."""
         for found, page, node in self._entries_from(key):
             return self._value(page, node) if found == key else None
         return None
@@ -130,13 +129,13 @@ class LmdbFile:
         _, flags, self._depth, _, _, _, self._entries, self._root = _TREE.unpack(tree)
         for flag, name in _FLAGS.items():
             if flags & flag:
-                self._fail(f"has {name}, which is not read; copy its entries into a plain database.")
+                self._fail(f"has {name}, which is not supported; copy its entries into a plain database.")
         is_empty = self._entries == 0
         if self._depth > _DEEPEST or self._entries > self._size // _NODE.size or is_empty != (self._root == _NO_PAGE):
             self._damaged(0, f"it claims {self._entries} entries, {self._depth} levels deep")
 
     def _meta(self, at: int) -> tuple[int, int, int, bytes] | None:
-        """One of the two start pages: transaction, page size, last page, tree; None where there is none."""
+        """One of the two start pages: transaction, page size, last page, tree; None if it is no start page."""
         page = self._read(at, _HEADER.size + _META.size)
         if len(page) < _HEADER.size + _META.size:
             return None
@@ -148,9 +147,9 @@ class LmdbFile:
         return transaction, size, last, main
 
     def _page(self, number: int, level: int) -> _Page:
-        """A page of the tree, its nodes and keys within it, none over another."""
+        """A page of the tree, with its nodes and keys checked to be within it and disjoint."""
         if not 2 <= number <= self._last:
-            self._damaged(number, f"it lies outside of 2 to {self._last}")
+            self._damaged(number, f"it is outside of 2 to {self._last}")
         data = self._read(number * self._page_size, self._page_size)
         if len(data) < self._page_size:
             self._damaged(number, "the file ends before it")
@@ -160,12 +159,12 @@ class LmdbFile:
             self._damaged(number, f"expected a {'leaf' if expected == _LEAF else 'branch'}")
         count = (lower - _HEADER.size) // 2
         if not count > 0 or not lower <= upper <= self._page_size:
-            self._damaged(number, "its header says nothing sensible")
+            self._damaged(number, "its header is inconsistent")
         nodes = struct.unpack_from(f"<{count}H", data, _HEADER.size)
         keys, room = [], self._page_size - upper
         for node in nodes:
             if not upper <= node <= self._page_size - _NODE.size:
-                self._damaged(number, "an entry lies outside of it")
+                self._damaged(number, "an entry is outside of it")
             low, high, kind, length = _NODE.unpack_from(data, node)
             start = node + _NODE.size
             end = start + length
@@ -173,14 +172,14 @@ class LmdbFile:
             if expected == _LEAF:
                 room -= 8 if kind & _BIG else low | high << 16
             if end > self._page_size or room < 0:
-                self._damaged(number, "its entries reach out of it or overlap")
+                self._damaged(number, "its entries exceed it or overlap")
             keys.append(data[start:end])
         return _Page(number, data, nodes, tuple(keys))
 
     def _entries_from(self, start: bytes) -> Iterator[tuple[bytes, _Page, int]]:
         """Key, page and node of each entry from ``start`` on.
 
-        Keys must rise, and no more pages are met than there are, whatever points where.
+        Checks that keys increase, and that no more pages are visited than there are.
         """
         if self._root == _NO_PAGE:
             return
@@ -191,25 +190,25 @@ class LmdbFile:
             page = self._page(number, level)
             pages += 1
             if pages > self._size // self._page_size:
-                self._damaged(number, "its pages go in circles")
+                self._damaged(number, "its pages form a cycle")
             if level < self._depth:
-                # The first key of a branch is empty: what is below comes before the second.
+                # The first key of a branch is empty: entries below it come before the second key.
                 first = bisect.bisect_right(page.keys, start, lo=1) - 1 if last is None else 0
                 waiting += [(self._child(page, node), level + 1) for node in reversed(page.nodes[first:])]
                 continue
             first = bisect.bisect_left(page.keys, start) if last is None else 0
             for key, node in zip(page.keys[first:], page.nodes[first:], strict=True):
                 if last is not None and key <= last:
-                    self._damaged(number, "its keys do not rise")
+                    self._damaged(number, "its keys do not increase")
                 last = key
                 count += 1
                 size, flags = self._size_and_flags(page, node)
                 large += size if flags & _BIG else 0
                 if count > self._entries or large > self._size:
-                    self._damaged(number, "there is more in the tree than in the file")
+                    self._damaged(number, "the tree has more data than the file")
                 yield key, page, node
         if not start and count != self._entries:
-            self._damaged(self._root, f"{self._entries} entries are announced and {count} are there")
+            self._damaged(self._root, f"{self._entries} entries are announced and {count} exist")
 
     def _child(self, page: _Page, node: int) -> int:
         low, high, top, _ = _NODE.unpack_from(page.data, node)
@@ -218,7 +217,7 @@ class LmdbFile:
     def _size_and_flags(self, page: _Page, node: int) -> tuple[int, int]:
         low, high, flags, _ = _NODE.unpack_from(page.data, node)
         if flags & ~_BIG:
-            self._fail("has databases or several values under one key, which is not read; copy its entries.")
+            self._fail("has databases or several values under one key, which is not supported; copy its entries.")
         return low | high << 16, flags
 
     def _value(self, page: _Page, node: int) -> bytes:
@@ -226,7 +225,7 @@ class LmdbFile:
         start = node + _NODE.size + _NODE.unpack_from(page.data, node)[3]
         stored = 8 if flags & _BIG else size
         if start + stored > self._page_size:
-            self._damaged(page.number, "a value reaches out of it")
+            self._damaged(page.number, "a value exceeds it")
         if not flags & _BIG:
             return page.data[start : start + size]
         if size > self._limits.size:
@@ -235,7 +234,7 @@ class LmdbFile:
             )
         number = struct.unpack_from("<Q", page.data, start)[0]
         if not 2 <= number <= self._last:
-            self._damaged(page.number, f"a value lies on page {number} of {self._last}")
+            self._damaged(page.number, f"a value is on page {number} of {self._last}")
         head = self._read(number * self._page_size, _RUN.size)
         own, _, kind, pages = _RUN.unpack(head) if len(head) == _RUN.size else (-1, 0, 0, 0)
         if own != number or not kind & _OVERFLOW or _RUN.size + size > pages * self._page_size:

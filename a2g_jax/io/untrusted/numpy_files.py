@@ -1,8 +1,8 @@
-"""NumPy's ``.npy`` and ``.npz`` files from sources that nobody vouches for.
+"""NumPy's ``.npy`` and ``.npz`` files from untrusted sources.
 
-``numpy.load`` allocates what a header claims and, where it is asked to, runs the pickles inside. Here each claim is
-checked against the bytes that are there and against the limits, and arrays of Python objects, where they are asked
-for, go through :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`.
+``numpy.load`` allocates the size that a header claims and, with ``allow_pickle``, executes pickles. Here each claim is
+checked against the size of the data and against the limits, and arrays of Python objects, where they are allowed, are
+decoded as by :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`.
 """
 
 import io
@@ -24,12 +24,12 @@ from a2g_jax.io.untrusted.pickles import decode_with
 
 _MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
-#: Largest piece read at once: a list of members of more is no archive of arrays.
+#: Largest single read in bytes; an archive of arrays has no longer list of members.
 _LARGEST_READ = 2**20
 _ITEM = r"'descr': *+'([^']{1,15})'|'fortran_order': *+(True|False)|'shape': *+\(([0-9L, ]{0,999})\)"
 _HEADER = re.compile(rf"\{{ *+(?:(?:{_ITEM}),? *+){{3}}\}}")
 _SIZE = re.compile(r"[0-9]{1,18}L?")
-# What zipfile and zlib raise on damaged bytes.
+# Exceptions of zipfile and zlib for damaged bytes.
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, struct.error, ArithmeticError, EOFError, IndexError, KeyError, MemoryError,
     NotImplementedError, OSError, RuntimeError, ValueError,
@@ -42,11 +42,11 @@ def read_npy(path: str | os.PathLike[str], *, objects: bool = False, limits: Lim
     Args:
         path: the file.
         objects: whether arrays of Python objects are read too (as plain values only).
-        limits: how much it may take.
+        limits: bounds on its memory.
 
     Raises:
         InputError: no such file, damaged, beyond the limits, of records or dates, or of Python objects that are
-            refused or not asked for.
+            refused or not allowed.
     """
     path = check_readable(path, "an .npy array")
     budget = Budget(str(path), limits or Limits())
@@ -67,11 +67,10 @@ def read_npz(
         path: the file.
         names: which arrays to read, without ``.npy``; None reads all.
         objects: whether arrays of Python objects are read too (as plain values only).
-        limits: how much all of them may take, unpacked.
+        limits: bounds on all of them together, unpacked.
 
     Raises:
-        InputError: no such file, no archive, damaged, without an array that is asked for, or what
-            :func:`read_npy` raises.
+        InputError: no such file, not an archive, damaged, a missing array, or for the reasons of :func:`read_npy`.
     """
     path = check_readable(path, "an .npz archive")
     budget = Budget(str(path), limits or Limits())
@@ -97,7 +96,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whol
     try:
         with archive.open(info) as file:
             data = bytearray()
-            while piece := file.read(_LARGEST_READ // 2):  # never more than there is, whatever is announced
+            while piece := file.read(_LARGEST_READ // 2):  # never more than the file has, whatever size is announced
                 data += piece
             if len(data) != info.file_size:
                 raise EOFError("it is shorter than announced")
@@ -116,7 +115,7 @@ def _array(data: bytes | bytearray, objects: bool, budget: Budget) -> np.ndarray
     if not dtype.hasobject:
         return plain_array(content, dtype, shape, "F" if fortran else "C", budget, start)
     if not objects:
-        raise budget.error(start, f"is an array of Python objects, which are not read from here; {CONVERT}.")
+        raise budget.error(start, f"is an array of Python objects, which are not allowed here; {CONVERT}.")
     array = decode_with(bytes(content), budget)
     if not isinstance(array, np.ndarray) or array.shape != shape:
         raise budget.damage(start, f"expected an array of shape {clip(shape)}")
@@ -124,7 +123,7 @@ def _array(data: bytes | bytearray, objects: bool, budget: Budget) -> np.ndarray
 
 
 def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[int, ...], bool, int]:
-    """Type, shape, whether the first axis runs fastest, and where the content begins."""
+    """Type, shape, whether the first axis varies fastest, and the position of the content."""
     if data[:6] != _MAGIC or len(data) < 12:
         raise budget.error(0, "is not a NumPy array; expected one as numpy.save writes.")
     if data[6] not in (1, 2, 3) or data[7] != 0:
@@ -149,7 +148,7 @@ def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[in
 
 
 class _SmallReads(io.RawIOBase):
-    """A file that refuses to be read in large pieces, which ``zipfile`` does for the size that a file claims."""
+    """A file that refuses large reads, such as those of ``zipfile`` for the sizes that a file claims."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -169,7 +168,7 @@ class _SmallReads(io.RawIOBase):
     def read(self, size: int = -1) -> bytes:
         data = self.file.read(size if 0 <= size <= _LARGEST_READ else _LARGEST_READ + 1)
         if len(data) > _LARGEST_READ:
-            raise zipfile.BadZipFile("a piece of it is too large")
+            raise zipfile.BadZipFile("a part of it is too large")
         return data
 
 

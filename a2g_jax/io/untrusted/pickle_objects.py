@@ -1,4 +1,4 @@
-"""The few objects that a pickle may build, each by a function of this package that checks what it is given."""
+"""The few objects that a pickle may build, each by a function of this package that checks its arguments."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ _HINTS = {
 
 @dataclass(frozen=True, eq=False)
 class Global:
-    """A name that a pickle asked for and may use in one way only; never a value."""
+    """A global that a pickle refers to and may only call or pass to a reducer; never a value."""
 
     name: str
 
 
 @dataclass(eq=False)
 class Unfinished:
-    """An array or a type that gets its content by a later ``BUILD``; ``value`` is None until then."""
+    """An array or a type whose content a later ``BUILD`` sets; ``value`` is None until then."""
 
     kind: str
     value: Any = None
@@ -37,10 +37,10 @@ class Unfinished:
 
 
 def find_global(module: str, name: str, budget: Budget, at: int) -> Global:
-    """The marker for a global that may be used.
+    """The marker for an allowed global.
 
     Raises:
-        InputError: any other, with its name.
+        InputError: any other global, with its name.
     """
     root, _, rest = module.partition(".")
     root = _MODULES.get(root, root)
@@ -50,14 +50,14 @@ def find_global(module: str, name: str, budget: Budget, at: int) -> Global:
     if full in _REDUCERS or full in ("numpy.ndarray", "copyreg._reconstructor", "builtins.object"):
         return Global(full)
     hint = _HINTS.get(root, CONVERT)
-    raise budget.error(at, f"asks for {clip(f'{module}.{name}', 120)}, which is refused, and nothing was run; {hint}.")
+    raise budget.error(at, f"refers to {clip(f'{module}.{name}', 120)}, which is refused, and nothing was run; {hint}.")
 
 
 def reduce(function: Any, arguments: Any, budget: Budget, at: int) -> Any:
-    """What ``REDUCE`` means: the object that ``function`` would make of ``arguments``.
+    """The result of ``REDUCE``: the object that ``function`` would build from ``arguments``.
 
     Raises:
-        InputError: the function or its arguments are not among the few that are known.
+        InputError: the function or its arguments are not allowed.
     """
     if not isinstance(function, Global) or function.name not in _REDUCERS:
         name = function.name if isinstance(function, Global) else clip(function)
@@ -68,10 +68,10 @@ def reduce(function: Any, arguments: Any, budget: Budget, at: int) -> Any:
 
 
 def finish(thing: Any, state: Any, budget: Budget, at: int) -> Any:
-    """What ``BUILD`` means: the array or type that is complete now.
+    """The result of ``BUILD``: the completed array or type.
 
     Raises:
-        InputError: for any other object, or a state that does not fit.
+        InputError: any other object, or an invalid state.
     """
     if not isinstance(thing, Unfinished) or thing.done:
         raise budget.error(at, f"sets the state of {_named(thing)}, which is refused; {CONVERT}.")
@@ -141,7 +141,7 @@ def _from_buffer(arguments: tuple, budget: Budget, at: int) -> np.ndarray:
 
 
 def _bytes(content: Any, budget: Budget, at: int) -> bytes | bytearray:
-    # Python 2 wrote bytes as its str, which is text here where it is ASCII.
+    # Python 2 wrote bytes as its str, which is decoded as text where it is ASCII.
     if type(content) is str and content.isascii():
         return content.encode("ascii")
     if type(content) not in (bytes, bytearray):

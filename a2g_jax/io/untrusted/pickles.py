@@ -1,11 +1,11 @@
-"""Pickles read as data: an own interpreter of the opcodes that can only build plain values.
+"""Pickles read as data, by an interpreter of the opcodes that can only build plain values.
 
-``pickle.Unpickler`` with an allow-list in ``find_class`` would be less code, but what is allowed is then still called
-with whatever arguments the file gives, ``BUILD`` still runs ``__setstate__``, and the C code still allocates what
-the file says (one ``LONG_BINPUT`` of 2**31 asks for gigabytes). Here no opcode calls anything of the file's choice:
-``REDUCE`` picks a function of this package by the name of the global, and that function checks its arguments.
+``pickle.Unpickler`` with an allow-list in ``find_class`` would be less code, but it would still call allowed functions
+with any arguments of the file's choice, run ``__setstate__`` on ``BUILD``, and allocate any size in C (gigabytes for a
+single ``LONG_BINPUT`` of 2**31). Here no opcode calls anything of the file's choice: ``REDUCE`` selects a function of
+this package by the name of the global, and that function checks its arguments.
 
-The opcodes are those of Python's ``pickletools`` (protocols 0 to 5).
+The opcodes and their arguments are read with the tables of Python's ``pickletools`` (protocols 0 to 5).
 """
 
 import os
@@ -19,14 +19,14 @@ from a2g_jax.io.untrusted.values import check_value
 
 
 def read_pickle(path: str | os.PathLike[str], limits: Limits | None = None) -> Any:
-    """The value in a pickle file, without running any of it.
+    """The value in a pickle file, decoded without executing any of it.
 
-    The value is made of None, bool, int, float, complex, str, bytes, bytearray, list, tuple, dict, set, frozenset,
+    The value consists of None, bool, int, float, complex, str, bytes, bytearray, list, tuple, dict, set, frozenset,
     and NumPy arrays, scalars and types of plain numbers and text; ``OrderedDict`` becomes dict. The byte strings of
     Python 2 become str where they are ASCII, else bytes.
 
     Raises:
-        InputError: no such file, damaged, beyond the limits, or made of anything else (with its name and place).
+        InputError: no such file, damaged, beyond the limits, or any other content (with its name and place).
     """
     path = check_readable(path, "a pickle file")
     budget = Budget(str(path), limits or Limits())
@@ -39,12 +39,12 @@ def read_pickle(path: str | os.PathLike[str], limits: Limits | None = None) -> A
 
 
 def decode_pickle(data: bytes, name: str, limits: Limits | None = None) -> Any:
-    """The value of pickled bytes, as :func:`read_pickle` builds it; ``name`` stands in its errors."""
+    """The value of pickled bytes, decoded as by :func:`read_pickle`; errors call the data ``name``."""
     return decode_with(data, Budget(name, limits or Limits()))
 
 
 def decode_with(data: bytes, budget: Budget) -> Any:
-    """The value of pickled bytes within what is left of a budget."""
+    """The value of pickled bytes, charged to a budget."""
     machine = PickleMachine(data, budget)
     try:
         value = machine.run()

@@ -1,4 +1,4 @@
-"""The last look at a decoded value: plain, finite, and not larger than it seems."""
+"""Final check of a decoded value: plain, without cycles, and within the limits when written out."""
 
 from typing import Any
 
@@ -6,35 +6,35 @@ import numpy as np
 
 from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
 
-#: Bytes that a slot in a container counts for.
+#: Bytes charged for a slot in a container.
 SLOT = 16
 _ATOMS = frozenset({type(None), bool, int, float, complex})
 _TEXTS = frozenset({str, bytes, bytearray})
 _CONTAINERS = frozenset({list, tuple, dict, set, frozenset})
 _KEYS = frozenset({type(None), bool, int, float, str, bytes})
 _NUMPY_KEYS = (np.bool_, np.integer, np.floating, np.str_, np.bytes_)
-#: A tuple's hash can be steered by whoever wrote the file, so that each look-up meets all others.
+#: The author of a file can choose tuples with equal hashes, so that each look-up compares with all others.
 _MOST_TUPLE_KEYS = 4096
 _LONGEST_TUPLE_KEY = 16
-#: Bytes that meeting one other tuple counts for: what bounds the memory bounds the look-ups of all dictionaries.
+#: Bytes charged for the comparison with one other tuple: the memory limit also bounds the time of look-ups.
 _TUPLE_KEY = 32
 
 
 def check_value(value: Any, budget: Budget, at: int) -> None:
-    """Refuse what is not plain, holds itself, nests too deeply, or grows too large when written out.
+    """Refuse values that are not plain, contain themselves, nest too deeply, or are too large when written out.
 
-    A few bytes can describe a list that holds the same list twice, which holds the same list twice ...: it is small
-    in memory, and whoever walks it never comes back. So each value counts as often as it is reached.
+    A few bytes can describe a list that holds the same list twice, which holds the same list twice ...: it is small in
+    memory, but traversing it takes exponential time. So each value counts once for each reference.
 
     Raises:
         InputError: for each of these.
     """
-    # Id of a finished container -> (bytes written out, levels of nesting); None while it is being walked.
-    known: dict[int, tuple[int, int] | None] = {}
+    # Id of a finished container -> (bytes written out, levels of nesting); None while it is being traversed.
+    sizes: dict[int, tuple[int, int] | None] = {}
     if not _is_container(value):
         _add(_leaf(value, budget, at), budget, at)
         return
-    known[id(value)] = None
+    sizes[id(value)] = None
     # Each frame: the container, its members still to come, bytes so far, levels so far.
     frames: list[list[Any]] = [[value, _members(value), 0, 0]]
     while frames:
@@ -44,21 +44,21 @@ def check_value(value: Any, budget: Budget, at: int) -> None:
                 frame[2] += _leaf(member, budget, at)
                 continue
             key = id(member)
-            if key in known:
-                done = known[key]
+            if key in sizes:
+                done = sizes[key]
                 if done is None:
                     raise budget.error(at, f"holds a {type(member).__name__} that holds itself; {CONVERT}.")
                 frame[2] += done[0] + SLOT
                 frame[3] = max(frame[3], done[1])
                 continue
-            known[key] = None
+            sizes[key] = None
             frames.append([member, _members(member), 0, 0])
             break
         else:
             frames.pop()
             size, levels = frame[2], frame[3] + 1
             _add(size, budget, at)
-            known[id(frame[0])] = (size, levels)
+            sizes[id(frame[0])] = (size, levels)
             if frames:
                 frames[-1][2] += size + SLOT
                 frames[-1][3] = max(frames[-1][3], levels)
@@ -67,7 +67,7 @@ def check_value(value: Any, budget: Budget, at: int) -> None:
 
 
 def check_key(key: Any, owner: dict | set | list, budget: Budget, at: int) -> None:
-    """Refuse keys of dictionaries and members of sets that cannot be hashed, or only slowly, before they are."""
+    """Refuse keys of dictionaries and members of sets that cannot be hashed, or only slowly."""
     if type(key) is tuple:
         if len(key) > _LONGEST_TUPLE_KEY or len(owner) > _MOST_TUPLE_KEYS:
             raise budget.error(at, f"has too many or too long tuples as keys; {CONVERT}.")

@@ -7,17 +7,17 @@ from a2g_jax.nn.flow.broadcast import of_channels
 
 Params = dict[str, Array]
 
-#: Added to a standard deviation before its inverse is taken.
+#: Added to standard deviations before division.
 _EPSILON = 1e-6
 
 
 def init_actnorm(channels: int) -> Params:
-    """The identity; :func:`fit_actnorm` makes the parameters that training starts from."""
+    """Parameters of the identity; training starts from those of :func:`fit_actnorm`."""
     return {"bias": jnp.zeros((channels,)), "log_scale": jnp.zeros((channels,))}
 
 
 def fit_actnorm(x: Float[Array, "B T C"]) -> Params:
-    """Parameters for which ``x`` comes out with mean 0 and standard deviation 1 in every channel."""
+    """Parameters that normalise ``x`` to mean 0 and standard deviation 1 in every channel."""
     std = jnp.std(x, axis=(0, 1))
     return {"bias": -jnp.mean(x, axis=(0, 1)), "log_scale": -jnp.log(std + _EPSILON)}
 
@@ -28,10 +28,10 @@ def actnorm(params: Params, x: Float[Array, "*S C"]) -> Float[Array, "*S C"]:
 
 
 def actnorm_inverse(params: Params, y: Float[Array, "*S C"]) -> Float[Array, "*S C"]:
-    """What :func:`actnorm` made ``y`` of."""
+    """Inverse of :func:`actnorm`."""
     return y * jnp.exp(-of_channels(params["log_scale"], y)) - of_channels(params["bias"], y)
 
 
 def actnorm_log_det(params: Params) -> Float[Array, ""]:
-    """Of one frame; the same for all."""
+    """Log-determinant of one frame, the same for all."""
     return jnp.sum(params["log_scale"])

@@ -1,4 +1,4 @@
-"""Vectors of channels beside arrays of frames."""
+"""Broadcasting of channel vectors over frames."""
 
 import jax.numpy as jnp
 from jaxtyping import Array

@@ -1,7 +1,8 @@
 """Affine coupling whose scale and shift come from a recurrent network over time (MoGlow, Sec. 3.3).
 
-The first half of a frame's channels is kept. With what is known of the frame (pose history, audio, style) it goes
-through recurrent layers and a linear layer, which starts at zero, to a scale and a shift of the second half.
+The first half of a frame's channels is kept. Together with the pose history and the condition of the frame (audio,
+style) it is the input of recurrent layers and a linear layer, initialised to zero, that give a scale and a shift of the
+second half.
 """
 
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from a2g_jax.nn.flow.broadcast import of_channels
 from a2g_jax.nn.recurrent import gru_scan, gru_step, lstm_scan, lstm_step
 
 Params = dict[str, Any]
-#: Of each layer: (B, H) of a GRU, a pair of them of an LSTM.
+#: Hidden state of each layer: (B, H) of a GRU, a pair of these of an LSTM.
 States = tuple[Any, ...]
 
 #: Smallest scale of the second half.
@@ -28,17 +29,17 @@ class Shape(NamedTuple):
     """Sizes of a coupling."""
 
     channels: int
-    """Of a frame."""
+    """Channels of a frame."""
     history: int
-    """Values of the pose history of a frame."""
-    known: int
-    """Values that are known of a frame before any pose is: audio, style."""
+    """Width of the pose history of a frame."""
+    condition: int
+    """Width of the condition of a frame: audio, style."""
     hidden: int
     layers: int = 2
     cell: str = "gru"
     """``gru`` or ``lstm``."""
     exact: bool = False
-    """Whether the layer is the identity at first; otherwise it scales by s(2) = 0.88, as the authors' does."""
+    """Whether the layer is initialised to the identity; otherwise it scales by s(2) = 0.88, as the authors' does."""
 
     @property
     def kept(self) -> int:
@@ -47,7 +48,8 @@ class Shape(NamedTuple):
 
 
 def init_coupling(key: Key[Array, ""], shape: Shape) -> Params:
-    """Recurrent weights uniform within the root of one over their width, as PyTorch's; the last layer zero."""
+    """Initial parameters: recurrent weights uniform within the root of one over their width, as PyTorch's; the last
+    layer zero."""
     gates, bound = _GATES[shape.cell] * shape.hidden, shape.hidden**-0.5
 
     def uniform(number: int, *size: int) -> Array:
@@ -63,7 +65,7 @@ def init_coupling(key: Key[Array, ""], shape: Shape) -> Params:
         if layer == 0:
             recurrent["kept_kernel"] = uniform(3, shape.kept, gates)
             recurrent["history_kernel"] = uniform(4, shape.history, gates)
-            recurrent["known_kernel"] = uniform(5, shape.known, gates)
+            recurrent["known_kernel"] = uniform(5, shape.condition, gates)
         else:
             recurrent["input_kernel"] = uniform(8 * layer + 3, shape.hidden, gates)
         layers.append(recurrent)
@@ -75,30 +77,30 @@ def init_coupling(key: Key[Array, ""], shape: Shape) -> Params:
     }
 
 
-def project_known(params: Params, known: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
-    """The share of the first layer's gates that no pose has a part in, with the bias: one product for all frames."""
+def project_condition(params: Params, condition: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
+    """Contribution of the condition and the bias to the gates of the first layer: one product for all frames."""
     first = params["layer_0"]
-    projected: Float[Array, "*S gates"] = known @ first["known_kernel"]
+    projected: Float[Array, "*S gates"] = condition @ first["known_kernel"]
     return projected + of_channels(first["input_bias"], projected)
 
 
-def project_last_known(params: Params, last: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
-    """What the last of the known values add to :func:`project_known` of zeros in their places."""
+def project_last_condition(params: Params, last: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
+    """Contribution of the condition's last values, to add to :func:`project_condition` with zeros in their place."""
     kernel = params["layer_0"]["known_kernel"]
     projected: Float[Array, "*S gates"] = last @ kernel[kernel.shape[0] - last.shape[-1] :]
     return projected
 
 
 def start_states(shape: Shape, count: int, dtype: Any = jnp.float32) -> States:
-    """Zero, as at the start of every training clip."""
+    """Zero states, as at the start of every training clip."""
     zeros = jnp.zeros((count, shape.hidden), dtype)
     return tuple((zeros, zeros) if shape.cell == "lstm" else zeros for _ in range(shape.layers))
 
 
-def _over_time(params, shape, kept, history, known):
+def _over_time(params, shape, kept, history, condition):
     """Output of the recurrent layers for whole clips."""
     first = params["layer_0"]
-    projected = project_known(params, known) + history @ first["history_kernel"] + kept @ first["kept_kernel"]
+    projected = project_condition(params, condition) + history @ first["history_kernel"] + kept @ first["kept_kernel"]
     x = jnp.swapaxes(projected, 0, 1)
     for layer, state in enumerate(start_states(shape, kept.shape[0], kept.dtype)):
         weights = params[f"layer_{layer}"]
@@ -141,11 +143,11 @@ def coupling(
     shape: Shape,
     x: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
-    known: Float[Array, "B T D"],
+    condition: Float[Array, "B T D"],
 ) -> tuple[Float[Array, "B T C"], Float[Array, "B T"]]:
     """``(z2 + shift) scale`` of the second half over whole clips, and the log-determinant of every frame."""
     kept, changed = jnp.split(x, [shape.kept], axis=-1)
-    scale, shift = _scale_and_shift(params, shape, _over_time(params, shape, kept, history, known))
+    scale, shift = _scale_and_shift(params, shape, _over_time(params, shape, kept, history, condition))
     return jnp.concatenate([kept, (changed + shift) * scale], axis=-1), jnp.sum(jnp.log(scale), axis=-1)
 
 
@@ -154,11 +156,11 @@ def coupling_inverse(
     shape: Shape,
     y: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
-    known: Float[Array, "B T D"],
+    condition: Float[Array, "B T D"],
 ) -> Float[Array, "B T C"]:
-    """What :func:`coupling` made ``y`` of, for all frames at once, since the history is given."""
+    """Inverse of :func:`coupling`, for all frames at once, since the history is given."""
     kept, changed = jnp.split(y, [shape.kept], axis=-1)
-    scale, shift = _scale_and_shift(params, shape, _over_time(params, shape, kept, history, known))
+    scale, shift = _scale_and_shift(params, shape, _over_time(params, shape, kept, history, condition))
     return jnp.concatenate([kept, changed / scale - shift], axis=-1)
 
 
@@ -173,8 +175,8 @@ def coupling_inverse_step(
     """:func:`coupling_inverse` of one frame.
 
     Args:
-        projected: of :func:`project_known`.
-        states: after the frame before.
+        projected: from :func:`project_condition`.
+        states: after the previous frame.
     """
     kept, changed = jnp.split(y, [shape.kept], axis=-1)
     output, after = _one_frame(params, shape, kept, history, projected, states)

@@ -14,8 +14,8 @@ from a2g_jax.nn.flow.coupling import (
     coupling_inverse,
     coupling_inverse_step,
     init_coupling,
-    project_known,
-    project_last_known,
+    project_condition,
+    project_last_condition,
     start_states,
 )
 from a2g_jax.nn.flow.invertible import (
@@ -31,7 +31,7 @@ Params = dict[str, Any]
 
 
 def init_glow(key: Key[Array, ""], shape: Shape, steps: int) -> Params:
-    """Of K steps; :func:`fit_glow` sets the actnorms from data."""
+    """Initial parameters of K steps; :func:`fit_glow` sets the actnorms from data."""
 
     def one(step_key: Key[Array, ""]) -> Params:
         keys = jax.random.split(step_key)
@@ -49,14 +49,14 @@ def fit_glow(
     shape: Shape,
     x: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
-    known: Float[Array, "B T D"],
+    condition: Float[Array, "B T D"],
 ) -> Params:
-    """Every step's actnorm set so that what reaches it comes out with mean 0 and standard deviation 1."""
+    """Parameters whose actnorms give outputs of mean 0 and standard deviation 1 for this batch."""
 
     def step(x, one):
         fitted = fit_actnorm(x)
         x = invertible(one["invertible"], actnorm(fitted, x))
-        return coupling(one["coupling"], shape, x, history, known)[0], fitted
+        return coupling(one["coupling"], shape, x, history, condition)[0], fitted
 
     _, fitted = jax.lax.scan(step, x, params)
     return {**params, "actnorm": fitted}
@@ -67,20 +67,20 @@ def glow(
     shape: Shape,
     x: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
-    known: Float[Array, "B T D"],
+    condition: Float[Array, "B T D"],
 ) -> tuple[Float[Array, "B T C"], Float[Array, "B T"]]:
     """Latents of a motion, and the log-determinant of every frame.
 
     Args:
         x: the motion.
-        history: what of the poses before each frame is known to it.
-        known: what else is known to it.
+        history: the poses before each frame, as its conditioning.
+        condition: the rest of its conditioning: audio, style.
     """
 
-    def step(carried, one):
-        x, log_det = carried
+    def step(carry, one):
+        x, log_det = carry
         x = invertible(one["invertible"], actnorm(one["actnorm"], x))
-        x, more = coupling(one["coupling"], shape, x, history, known)
+        x, more = coupling(one["coupling"], shape, x, history, condition)
         return (x, log_det + more + actnorm_log_det(one["actnorm"]) + invertible_log_det(one["invertible"])), None
 
     (z, log_det), _ = jax.lax.scan(step, (x, jnp.zeros(x.shape[:2], x.dtype)), params)
@@ -92,12 +92,12 @@ def glow_inverse(
     shape: Shape,
     z: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
-    known: Float[Array, "B T D"],
+    condition: Float[Array, "B T D"],
 ) -> Float[Array, "B T C"]:
     """The motion of latents, for all frames at once, since the history is given (teacher forcing)."""
 
     def step(x, one):
-        x = coupling_inverse(one["coupling"], shape, x, history, known)
+        x = coupling_inverse(one["coupling"], shape, x, history, condition)
         return actnorm_inverse(one["actnorm"], invertible_inverse(one["invertible"], x)), None
 
     x, _ = jax.lax.scan(step, z, params, reverse=True)
@@ -105,17 +105,17 @@ def glow_inverse(
 
 
 class Prepared(NamedTuple):
-    """A flow ready to sample frame by frame: per step, what need not be computed for every frame."""
+    """A flow prepared for sampling frame by frame, with everything precomputed that no frame changes."""
 
     couplings: tuple[Any, ...]
     matrices: tuple[Array, ...]
-    """Inverse of the convolution and of the scale of the actnorm in one, transposed."""
+    """Inverse of convolution and actnorm scale as one matrix, transposed."""
     biases: tuple[Array, ...]
-    """Of the actnorms."""
+    """Biases of the actnorms."""
 
 
 def prepare(params: Params) -> Prepared:
-    """Inverse matrices once, and the steps apart: a scan over them would copy every weight for every frame."""
+    """Precompute inverse matrices and unstack the steps: a scan over steps would copy every weight for every frame."""
     steps = len(params["actnorm"]["bias"])
     apart = [jax.tree.map(lambda array, k=k: array[k], params) for k in range(steps)]
     return Prepared(
@@ -125,18 +125,18 @@ def prepare(params: Params) -> Prepared:
     )
 
 
-def project(prepared: Prepared, known: Float[Array, "*S D"]) -> tuple[Array, ...]:
-    """For every step, its :func:`a2g_jax.nn.flow.coupling.project_known`."""
-    return tuple(project_known(one, known) for one in prepared.couplings)
+def project(prepared: Prepared, condition: Float[Array, "*S D"]) -> tuple[Array, ...]:
+    """:func:`a2g_jax.nn.flow.coupling.project_condition` of every step."""
+    return tuple(project_condition(one, condition) for one in prepared.couplings)
 
 
 def project_last(prepared: Prepared, last: Float[Array, "*S D"]) -> tuple[Array, ...]:
-    """For every step, its :func:`a2g_jax.nn.flow.coupling.project_last_known`."""
-    return tuple(project_last_known(one, last) for one in prepared.couplings)
+    """:func:`a2g_jax.nn.flow.coupling.project_last_condition` of every step."""
+    return tuple(project_last_condition(one, last) for one in prepared.couplings)
 
 
 def first_states(prepared: Prepared, shape: Shape, count: int, dtype: Any = jnp.float32) -> tuple[States, ...]:
-    """Zero states of every step for so many sequences."""
+    """Zero states of every step for ``count`` sequences."""
     return tuple(start_states(shape, count, dtype) for _ in prepared.couplings)
 
 
@@ -151,14 +151,14 @@ def glow_inverse_step(
     """:func:`glow_inverse` of one frame.
 
     Args:
-        projected: of :func:`project`, this frame's (B, gates) for every step.
-        states: after the frame before.
+        projected: this frame's rows of :func:`project`, (B, gates) for every step.
+        states: after the previous frame.
     """
     x, after = z, []
-    for one, matrix, bias, known, state in reversed(
+    for one, matrix, bias, gates, state in reversed(
         list(zip(prepared.couplings, prepared.matrices, prepared.biases, projected, states, strict=True))
     ):
-        x, state = coupling_inverse_step(one, shape, x, history, known, state)
+        x, state = coupling_inverse_step(one, shape, x, history, gates, state)
         x = x @ matrix - bias[None]
         after.append(state)
     return x, tuple(reversed(after))

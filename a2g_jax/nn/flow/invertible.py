@@ -1,7 +1,7 @@
 """Invertible 1x1 convolution with its matrix kept as an LU decomposition (Glow, Sec. 3.2, Eq. 10 and 11).
 
-``W = P (L + I) (U + diag(sign exp(log_scale)))``: L strictly lower, U strictly upper; P and the signs stay as they were
-drawn. So the log-determinant is a sum, and the inverse two triangular systems.
+``W = P (L + I) (U + diag(sign exp(log_scale)))``: L strictly lower, U strictly upper; P and the signs stay as
+initialised. So the log-determinant is a sum, and the inverse two triangular systems.
 """
 
 import jax
@@ -15,7 +15,7 @@ FIXED = ("permutation", "sign")
 
 
 def init_invertible(key: Key[Array, ""], channels: int) -> Params:
-    """A random rotation."""
+    """Parameters of a random rotation."""
     rotation, _ = jnp.linalg.qr(jax.random.normal(key, (channels, channels)))
     permutation, lower, upper = jax.scipy.linalg.lu(rotation)
     diagonal = jnp.diag(upper)
@@ -43,7 +43,7 @@ def weight(params: Params) -> Float[Array, "C C"]:
 
 
 def inverse_weight(params: Params) -> Float[Array, "C C"]:
-    """The inverse of :func:`weight`, by two triangular systems; take it once for a whole sampling run."""
+    """Inverse of :func:`weight`, by two triangular systems; compute it once for a sampling run."""
     permutation, lower, upper = _factors(params)
     half = jax.scipy.linalg.solve_triangular(lower, permutation.T, lower=True, unit_diagonal=True)
     inverse: Float[Array, "C C"] = jax.scipy.linalg.solve_triangular(upper, half, lower=False)
@@ -56,10 +56,10 @@ def invertible(params: Params, x: Float[Array, "*S C"]) -> Float[Array, "*S C"]:
 
 
 def invertible_inverse(params: Params, y: Float[Array, "*S C"]) -> Float[Array, "*S C"]:
-    """What :func:`invertible` made ``y`` of."""
+    """Inverse of :func:`invertible`."""
     return y @ inverse_weight(params).T
 
 
 def invertible_log_det(params: Params) -> Float[Array, ""]:
-    """Of one frame; the same for all."""
+    """Log-determinant of one frame, the same for all."""
     return jnp.sum(params["log_scale"])

@@ -1,13 +1,13 @@
-"""A linear first layer: what smooth motion says of the next frame, and how its errors hang together.
+"""A linear first layer: linear prediction of the next frame, and whitening of its errors.
 
-Poses at 20 frames a second follow almost linearly from those before them, and couplings that start at the identity take
-very long to learn that as exactly as a density needs. So the first layer subtracts a linear extrapolation of each
-channel and whitens what is left; both are fitted to the first batch, as actnorms are (Glow, Sec. 3.1), and trained on.
+Poses at 20 frames a second are almost linear functions of those before them, and couplings initialised to the identity
+learn this very slowly to the accuracy that a density needs. So the first layer subtracts a linear extrapolation of each
+channel and whitens the residual; both are fitted to the first batch, like actnorms (Glow, Sec. 3.1), and then trained.
 The published flows have no such layer.
 
 ``y = L (x - x_1 - sum_k a_k (x_k - x_{k+1}) - b x_1)``, with x_k the pose k frames before, coefficients a_k and a pull
 towards the mean pose b for every channel, and L lower triangular, so that the log-determinant is a sum. Without the
-pull, long motions drift away from the mean pose, since each frame only adds to the one before.
+pull, long motions drift away from the mean pose, since each frame only adds to the previous one.
 """
 
 import jax
@@ -18,16 +18,17 @@ from a2g_jax.nn.flow.broadcast import of_channels
 
 Params = dict[str, Array]
 
-#: Added to the variances that are divided by, as a share of their mean and at least this much.
+#: Ridge on variances before division: a share of their mean, and an absolute minimum.
 _RIDGE, _EPSILON = 1e-3, 1e-8
-#: The pull is fitted to one batch and must not be none, or even a push: its time constant, in frames.
+#: Bounds on the time constant of the pull, frames: fitted to one batch, it could vanish or change its sign.
 _SLOWEST, _FASTEST = 500.0, 5.0
 #: Not trained.
 FIXED_SPREAD = "spread"
 
 
 def init_predictor(history: int, channels: int) -> Params:
-    """The pose before, held, and errors as they are; :func:`fit_predictor` makes what training starts from."""
+    """Parameters that predict the previous pose and leave errors as they are; training starts from those of
+    :func:`fit_predictor`."""
     return {
         "coefficients": jnp.zeros((history - 1, channels)),
         "pull": jnp.zeros((channels,)),
@@ -38,7 +39,7 @@ def init_predictor(history: int, channels: int) -> Params:
 
 
 def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]) -> Params:
-    """Least squares of every channel on its own differences and its place, and the Cholesky factor of the errors'
+    """Least squares of every channel on its own differences and its last value, and the Cholesky factor of the errors'
     covariance."""
     channels = x.shape[-1]
     steps = _differences(poses).reshape(-1, poses.shape[2] - 1, channels)
@@ -46,10 +47,10 @@ def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]
     target = x.reshape(-1, channels) - place
     count = len(target)
 
-    def one_channel(step: Float[Array, "n lags"], wanted: Float[Array, " n"]) -> Float[Array, " lags"]:
+    def one_channel(step: Float[Array, "n lags"], residual: Float[Array, " n"]) -> Float[Array, " lags"]:
         square = step.T @ step / count
         size = _RIDGE * jnp.mean(jnp.diag(square)) + _EPSILON
-        return jnp.linalg.solve(square + size * jnp.eye(len(square)), step.T @ wanted / count)
+        return jnp.linalg.solve(square + size * jnp.eye(len(square)), step.T @ residual / count)
 
     coefficients = jax.vmap(one_channel, in_axes=(2, 1), out_axes=1)(steps, target)
     errors = target - jnp.sum(steps * coefficients[None], axis=1)
@@ -64,7 +65,7 @@ def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]
     return {
         "coefficients": coefficients,
         "pull": pull,
-        # In units of each row's own scale, so that steps of training mean the same everywhere.
+        # In units of each row's own scale, so that training steps have the same effect everywhere.
         "lower": jnp.tril(whitening / diagonal[:, None], -1),
         "log_scale": jnp.log(diagonal),
         FIXED_SPREAD: jnp.sqrt(jnp.mean(jnp.square(steps), axis=(0, 1))) + 1e-3,
@@ -72,7 +73,7 @@ def fit_predictor(x: Float[Array, "B T C"], poses: Float[Array, "B T history C"]
 
 
 def expected(params: Params, poses: Float[Array, "*S history C"]) -> Float[Array, "*S C"]:
-    """The extrapolation of poses, the oldest first."""
+    """Linear extrapolation of poses, the oldest first."""
     coefficients = params["coefficients"]
     steps = _differences(poses)
     weights = coefficients.reshape((1,) * (steps.ndim - 2) + coefficients.shape)
@@ -88,16 +89,16 @@ def predictor(params: Params, x: Float[Array, "*S C"], poses: Float[Array, "*S h
 def predictor_inverse(
     params: Params, y: Float[Array, "*S C"], poses: Float[Array, "*S history C"], unwhitening: Float[Array, "C C"]
 ) -> Float[Array, "*S C"]:
-    """What :func:`predictor` made ``y`` of.
+    """Inverse of :func:`predictor`.
 
     Args:
-        unwhitening: of :func:`inverse_whitening`; take it once for a whole sampling run.
+        unwhitening: from :func:`inverse_whitening`; compute it once for a sampling run.
     """
     return y @ unwhitening.T + expected(params, poses)
 
 
 def whitening(params: Params) -> Float[Array, "C C"]:
-    """L."""
+    """The whitening matrix L."""
     channels = len(params["log_scale"])
     unit = jnp.tril(params["lower"], -1) + jnp.eye(channels, dtype=params["lower"].dtype)
     return jnp.exp(params["log_scale"])[:, None] * unit
@@ -113,12 +114,12 @@ def inverse_whitening(params: Params) -> Float[Array, "C C"]:
 
 
 def predictor_log_det(params: Params) -> Float[Array, ""]:
-    """Of one frame; the same for all."""
+    """Log-determinant of one frame, the same for all."""
     return jnp.sum(params["log_scale"])
 
 
 def as_steps(params: Params, poses: Float[Array, "*S history C"]) -> Float[Array, "*S history C"]:
-    """Poses as networks see them best: the steps from pose to pose at a common scale, and the last pose."""
+    """Poses as network input: the steps from pose to pose at a common scale, and the last pose."""
     steps = _differences(poses)
     spread = of_channels(jax.lax.stop_gradient(params[FIXED_SPREAD]), steps)
     return jnp.concatenate([steps / spread, poses[..., -1:, :]], axis=-2)

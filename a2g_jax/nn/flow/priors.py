@@ -1,4 +1,4 @@
-"""Priors of a flow's latents: one frame of C channels at a time."""
+"""Priors over a flow's latents, one frame of C channels at a time."""
 
 import math
 
@@ -24,7 +24,7 @@ def log_prob(z: Float[Array, "*S C"], freedom: float = 0.0) -> Float[Array, "*S"
 
 
 def spread(normal: Float[Array, "*S C"], key: Key[Array, ""], freedom: float = 0.0) -> Float[Array, "*S C"]:
-    """Standard normal frames as frames of the prior: those of a Student-t share one divisor for all channels."""
+    """Samples of the prior from standard normal frames: a Student-t frame has one divisor for all channels."""
     if freedom == 0:
         return normal
     chi_square = 2.0 * jax.random.gamma(key, freedom / 2, normal.shape[:-1], normal.dtype)

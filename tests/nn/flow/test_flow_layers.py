@@ -36,12 +36,12 @@ CELLS = ("gru", "lstm")
 
 
 def shape_of(cell="gru", channels=5, hidden=6, exact=False):
-    return Shape(channels, history=7, known=4, hidden=hidden, layers=2, cell=cell, exact=exact)
+    return Shape(channels, history=7, condition=4, hidden=hidden, layers=2, cell=cell, exact=exact)
 
 
 def clips(shape, count=2, frames=9, dtype=jnp.float32, seed=1):
     keys = jax.random.split(jax.random.key(seed), 3)
-    sizes = (shape.channels, shape.history, shape.known)
+    sizes = (shape.channels, shape.history, shape.condition)
     return tuple(jax.random.normal(key, (count, frames, size), dtype) for key, size in zip(keys, sizes, strict=True))
 
 
@@ -108,16 +108,16 @@ class TestCoupling:
     @pytest.mark.parametrize("cell", CELLS)
     def test_at_first_scales_by_the_same_amount(self, cell):
         shape = shape_of(cell)
-        x, history, known = clips(shape)
-        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, known)
+        x, history, condition = clips(shape)
+        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, condition)
         np.testing.assert_array_equal(y[..., :2], x[..., :2])
         np.testing.assert_allclose(y[..., 2:], 0.880798 * x[..., 2:], rtol=1e-5)
         np.testing.assert_allclose(log_det, 3 * np.log(0.880798), rtol=1e-4)
 
     def test_exact_is_the_identity_at_first(self):
         shape = shape_of(exact=True)
-        x, history, known = clips(shape)
-        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, known)
+        x, history, condition = clips(shape)
+        y, log_det = coupling(init_coupling(KEY, shape), shape, x, history, condition)
         np.testing.assert_allclose(y, x, atol=1e-6)
         np.testing.assert_allclose(log_det, 0, atol=1e-6)
 
@@ -127,50 +127,50 @@ class TestGlow:
     @pytest.mark.parametrize("state", ["at first", "fitted", "trained"])
     def test_sixteen_steps_invert_in_single(self, cell, state):
         shape = shape_of(cell, channels=9)
-        x, history, known = clips(shape, frames=20)
-        params = self.params(shape, 16, state, x, history, known)
-        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, known)
-        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        x, history, condition = clips(shape, frames=20)
+        params = self.params(shape, 16, state, x, history, condition)
+        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, condition)
+        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, condition)
         np.testing.assert_allclose(back, x, atol=1e-4)
 
     @pytest.mark.parametrize("state", ["at first", "trained"])
     def test_sixteen_steps_invert_in_double(self, double, state):
         shape = shape_of(channels=9)
-        x, history, known = as_double(clips(shape, frames=20))
-        params = as_double(self.params(shape, 16, state, x, history, known))
-        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, known)
-        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        x, history, condition = as_double(clips(shape, frames=20))
+        params = as_double(self.params(shape, 16, state, x, history, condition))
+        z, _ = jax.jit(glow, static_argnums=1)(params, shape, x, history, condition)
+        back = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, condition)
         np.testing.assert_allclose(back, x, atol=1e-10)
 
     @pytest.mark.parametrize("cell", CELLS)
     def test_log_determinant_is_that_of_the_jacobian(self, double, cell):
         shape = shape_of(cell, channels=4)
-        x, history, known = as_double(clips(shape, count=1, frames=5))
+        x, history, condition = as_double(clips(shape, count=1, frames=5))
         params = trained(as_double(init_glow(KEY, shape, 3)))
-        _, log_det = glow(params, shape, x, history, known)
+        _, log_det = glow(params, shape, x, history, condition)
         # jacrev: the recurrent layers have no forward-mode derivative.
-        latents = lambda v: glow(params, shape, v.reshape(x.shape), history, known)[0].ravel()  # noqa: E731
+        latents = lambda v: glow(params, shape, v.reshape(x.shape), history, condition)[0].ravel()  # noqa: E731
         jacobian = jax.jit(jax.jacrev(latents))(x.ravel())
         np.testing.assert_allclose(log_det.sum(), np.linalg.slogdet(jacobian)[1], rtol=1e-8)
 
     def test_later_frames_do_not_reach_back(self):
         shape = shape_of()
-        x, history, known = clips(shape)
+        x, history, condition = clips(shape)
         params = trained(init_glow(KEY, shape, 2))
         run = jax.jit(glow, static_argnums=1)
-        z, log_det = run(params, shape, x, history, known)
-        other, other_log_det = run(params, shape, x.at[:, 5:].add(1.0), history, known)
+        z, log_det = run(params, shape, x, history, condition)
+        other, other_log_det = run(params, shape, x.at[:, 5:].add(1.0), history, condition)
         np.testing.assert_array_equal(other[:, :5], z[:, :5])
         np.testing.assert_array_equal(other_log_det[:, :5], log_det[:, :5])
 
     @pytest.mark.parametrize("cell", CELLS)
     def test_frame_by_frame_is_the_same(self, cell):
         shape = shape_of(cell)
-        z, history, known = clips(shape)
+        z, history, condition = clips(shape)
         params = trained(init_glow(KEY, shape, 4))
-        expected = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, known)
+        expected = jax.jit(glow_inverse, static_argnums=1)(params, shape, z, history, condition)
         prepared = prepare(params)
-        projected = project(prepared, known)
+        projected = project(prepared, condition)
 
         def step(states, frame):
             x, states = glow_inverse_step(prepared, shape, *frame, states)
@@ -182,31 +182,31 @@ class TestGlow:
 
     def test_fitted_latents_are_standardised_by_every_actnorm(self):
         shape = shape_of(exact=True)
-        x, history, known = clips(shape, count=8, frames=40)
-        params = fit_glow(init_glow(KEY, shape, 3), shape, 4.0 * x + 2.0, history, known)
-        z, _ = glow(params, shape, 4.0 * x + 2.0, history, known)
+        x, history, condition = clips(shape, count=8, frames=40)
+        params = fit_glow(init_glow(KEY, shape, 3), shape, 4.0 * x + 2.0, history, condition)
+        z, _ = glow(params, shape, 4.0 * x + 2.0, history, condition)
         # Rotations of standardised channels: their overall mean square is one.
         np.testing.assert_allclose(jnp.mean(jnp.square(z)), 1.0, atol=0.02)
 
     @pytest.mark.parametrize("freedom", [0.0, 5.0])
     def test_gradient_of_the_likelihood(self, double, freedom):
         shape = shape_of(channels=3, hidden=3)
-        x, history, known = as_double(clips(shape, count=1, frames=3))
+        x, history, condition = as_double(clips(shape, count=1, frames=3))
         params = trained(as_double(init_glow(KEY, shape, 2)), 0.1)
         free = {name: params[name] for name in ("actnorm", "coupling")}
 
         @jax.jit
         def loss(free, x):
-            z, log_det = glow({**params, **free}, shape, x, history, known)
+            z, log_det = glow({**params, **free}, shape, x, history, condition)
             return -jnp.mean(log_prob(z, freedom) + log_det)
 
         check_grads(loss, (free, x), order=1, modes=["rev"], eps=1e-6, atol=1e-6, rtol=1e-6)
 
     @staticmethod
-    def params(shape, steps, state, x, history, known):
+    def params(shape, steps, state, x, history, condition):
         params = init_glow(KEY, shape, steps)
         if state == "fitted":
-            return fit_glow(params, shape, x, history, known)
+            return fit_glow(params, shape, x, history, condition)
         return trained(params, 0.1) if state == "trained" else params
 
 
@@ -229,12 +229,12 @@ class TestPriors:
     @pytest.mark.parametrize("freedom", [0.0, 50.0])
     def test_the_density_of_a_flow_integrates_to_one(self, double, freedom):
         shape = shape_of(channels=2)
-        _, history, known = as_double(clips(shape, count=1, frames=1))
+        _, history, condition = as_double(clips(shape, count=1, frames=1))
         params = trained(as_double(init_glow(KEY, shape, 3)))
         grid = jnp.linspace(-40, 40, 1201)
         points = jnp.stack(jnp.meshgrid(grid, grid), axis=-1).reshape(-1, 1, 2)
         repeat = lambda a: jnp.broadcast_to(a, (len(points), *a.shape[1:]))  # noqa: E731
-        z, log_det = jax.jit(glow, static_argnums=1)(params, shape, points, repeat(history), repeat(known))
+        z, log_det = jax.jit(glow, static_argnums=1)(params, shape, points, repeat(history), repeat(condition))
         density = np.exp(np.asarray(log_prob(z, freedom) + log_det)).reshape(1201, 1201)
         mass = integrate.trapezoid(integrate.trapezoid(density, grid), grid)
         np.testing.assert_allclose(mass, 1.0, atol=2e-3)
