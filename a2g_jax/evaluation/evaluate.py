@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,15 +17,15 @@ from a2g_jax.evaluation.audit import Heard, listening_audit
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.places import Body, Pose
-from a2g_jax.evaluation.report import BASELINES
-from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
+from a2g_jax.evaluation.report import BASELINES, describe_metrics
+from a2g_jax.evaluation.scores import METRICS, Metric, Scorer, Target
 from a2g_jax.generation.engine import Generator
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.distribution import frechet_distance, split_floor
+from a2g_jax.metrics.context import SetContext
+from a2g_jax.metrics.distribution import split_floor
 from a2g_jax.metrics.intervals import bootstrap_mean
-from a2g_jax.metrics.labels import calinski_harabasz, silhouette
 from a2g_jax.training.run import Run
 
 #: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
@@ -87,6 +87,7 @@ def evaluate(
     judge: EmotionJudge | None = None,
     audit: bool = False,
     baselines: bool = True,
+    extra_metrics: Sequence[Metric] = (),
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Score runs and baselines; JSON-able.
@@ -96,6 +97,7 @@ def evaluate(
         network: without one, FGD, LPIPS and what is told of groups are left out.
         judge: without one, emotion accuracy is left out.
         baselines: whether the rows beside the runs are scored too.
+        extra_metrics: metrics of other packages (:func:`~a2g_jax.metrics.registry.find_metrics`).
         audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
         report: called with how many (candidate, clip) pairs are done, of how many.
 
@@ -111,7 +113,7 @@ def evaluate(
         segments = [piece for segment in segments for piece in _pieces(segment, least)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
-    scorer = Scorer(Body(corpus.body, corpus.representation), corpus.fps, network, judge)
+    scorer = Scorer(Body(corpus.body, corpus.representation), corpus.fps, network, judge, tuple(extra_metrics))
     targets = [_target(corpus, scorer, segment) for segment in segments]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
     speakers = [corpus.recordings[segment.recording].speaker for segment in segments]
@@ -120,7 +122,8 @@ def evaluate(
         if not baselines and name in BASELINES and name not in runs:
             continue
         per_clip: list[list[dict[str, float]]] = []
-        spread, features, count = [], [], 0
+        per_group: list[dict[str, float]] = []
+        features, count = [], 0
         for number, target in enumerate(targets):
             poses = draw(number)
             done += 1
@@ -128,11 +131,12 @@ def evaluate(
             if poses is None:
                 continue
             count = len(poses)
-            per_clip.append([scorer.sample(pose, target) for pose in poses])
-            spread.append(scorer.multimodality(poses))
+            motions = [scorer.context(pose, target) for pose in poses]
+            per_clip.append([scorer.motion_scores(motion) for motion in motions])
+            per_group.append(scorer.clip_scores(motions))
             features.append([scorer.features(pose) for pose in poses])
         if per_clip:
-            rows.append(Row(name, count, _summary(per_clip, spread, features, reference, speakers, seed)))
+            rows.append(Row(name, count, _summary(scorer, per_clip, per_group, features, reference, speakers, seed)))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -151,6 +155,8 @@ def evaluate(
         "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
         "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
     }
+    if extra_metrics:
+        about["extra_metrics"] = describe_metrics(extra_metrics)
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}
     return {"about": about, "rows": [asdict(row) for row in rows], "audits": audits}
 
@@ -225,59 +231,75 @@ def _candidates(
 
 
 def _summary(
+    scorer: Scorer,
     per_clip: list[list[dict[str, float]]],
-    spread: list[float],
+    per_group: list[dict[str, float]],
     features: list[list[np.ndarray]],
     reference: np.ndarray,
     speakers: list[str],
     seed: int,
 ) -> dict[str, dict[str, Any]]:
-    """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips."""
+    """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips.
+
+    Args:
+        per_clip: scores of every sample of every clip.
+        per_group: scores of every clip's samples together.
+    """
+    # The same draws for the same metric, whatever metrics of other packages there are.
     rng = np.random.default_rng(seed)
+    own, extra = tuple(METRICS.values()), scorer.extra_metrics
     summary: dict[str, dict[str, Any]] = {}
-    for name in PER_SAMPLE:
-        values = np.array([[scores.get(name, np.nan) for scores in clip] for clip in per_clip])
-        if np.isnan(values).all():
-            continue
-        # A clip too short for a metric has no score in any sample.
-        values = values[~np.isnan(values).all(axis=1)]
-        interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
-        best = {"lower": np.nanmin, "higher": np.nanmax}.get(METRICS[name].better)
-        summary[name] = {
-            "mean": interval.mean,
-            "low": interval.low,
-            "high": interval.high,
-            "best": None if best is None else float(np.nanmean(best(values, axis=1))),
-        }
-    if not np.isnan(spread).all():
-        interval = bootstrap_mean(np.array(spread), rng)
-        summary["multimodality"] = {**interval._asdict(), "best": None}
-    if len(reference) >= 2:
-        # One set of features for each sample number, over all clips, so that n is that of the truth.
-        sets = [np.concatenate([clip[sample] for clip in features]) for sample in range(len(features[0]))]
-        distances = [frechet_distance(vectors, reference).value for vectors in sets]
-        summary |= _groups(features, speakers)
-        summary["fgd"] = {"mean": float(np.mean(distances)), "low": None, "high": None, "best": float(min(distances))}
-    return summary
+    for metrics in (own, extra):
+        for metric in metrics:
+            if metric.per_sample and (cell := _sample_cell(metric, per_clip, rng)) is not None:
+                summary[metric.key] = cell
+        for metric in metrics:
+            values = np.array([scores.get(metric.key, np.nan) for scores in per_group])
+            if metric.scope == "clip" and not np.isnan(values).all():
+                summary[metric.key] = {**bootstrap_mean(values, rng)._asdict(), "best": None}
+    return summary | _set_cells(scorer, features, reference, speakers)
 
 
-def _groups(features: list[list[np.ndarray]], speakers: list[str]) -> dict[str, dict[str, Any]]:
-    """How well the speakers are grouped in the space of the features, for each sample number and on average."""
-    found: dict[str, list[float]] = {"chi": [], "silhouette": []}
-    numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
-    for sample in range(len(features[0])):
-        vectors = np.concatenate([clip[sample] for clip in features])
-        labels = np.concatenate(
-            [np.full(len(clip[sample]), numbers[name]) for clip, name in zip(features, speakers, strict=True)]
-        )
-        if not 2 <= len(np.unique(labels)) < len(labels):
-            return {}
-        found["chi"].append(calinski_harabasz(vectors, labels))
-        found["silhouette"].append(silhouette(vectors, labels))
+def _sample_cell(
+    metric: Metric, per_clip: list[list[dict[str, float]]], rng: np.random.Generator
+) -> dict[str, Any] | None:
+    values = np.array([[scores.get(metric.key, np.nan) for scores in clip] for clip in per_clip])
+    if np.isnan(values).all():
+        return None
+    # A clip too short for a metric has no value in any sample.
+    values = values[~np.isnan(values).all(axis=1)]
+    interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
+    best = {"lower": np.nanmin, "higher": np.nanmax}.get(metric.better)
     return {
-        name: {"mean": float(np.mean(values)), "low": None, "high": None, "best": None}
-        for name, values in found.items()
+        "mean": interval.mean,
+        "low": interval.low,
+        "high": interval.high,
+        "best": None if best is None else float(np.nanmean(best(values, axis=1))),
     }
+
+
+def _set_cells(
+    scorer: Scorer, features: list[list[np.ndarray]], reference: np.ndarray, speakers: list[str]
+) -> dict[str, dict[str, Any]]:
+    """One set of vectors for each sample number, over all clips, so that there are as many as of the truth."""
+    numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
+    sets = []
+    for sample in range(len(features[0])):
+        labels = [np.full(len(clip[sample]), numbers[name]) for clip, name in zip(features, speakers, strict=True)]
+        vectors = np.concatenate([clip[sample] for clip in features])
+        sets.append(scorer.set_scores(SetContext(vectors, reference, np.concatenate(labels))))
+    cells = {}
+    for metric in scorer.metrics:
+        values = [scores[metric.key] for scores in sets if metric.key in scores]
+        if metric.scope == "set" and len(values) == len(sets):
+            best = {"lower": min, "higher": max}.get(metric.better)
+            cells[metric.key] = {
+                "mean": float(np.mean(values)),
+                "low": None,
+                "high": None,
+                "best": None if best is None else float(best(values)),
+            }
+    return cells
 
 
 def _fingerprint(corpus: Corpus) -> str:

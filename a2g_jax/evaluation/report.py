@@ -1,11 +1,12 @@
 """The table of an evaluation as JSON, Markdown, LaTeX and a picture."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.scores import AGAINST_TRUTH, METRICS
+from a2g_jax.evaluation.scores import METRICS, Metric
 from a2g_jax.io.files import atomic_path, make_folder, read_json
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
@@ -45,16 +46,16 @@ def write_report(result: dict[str, Any], out: Path) -> list[Path]:
 
 def markdown(result: dict[str, Any]) -> str:
     """The table with what it is of and how it is read."""
-    about, names = result["about"], _metrics(result)
+    about, metrics = result["about"], _metrics(result)
     lines = []
     for title, part in (
-        ("Against the recorded motion", [name for name in names if name in AGAINST_TRUTH]),
-        ("Distribution, variety, rhythm and smoothness", [name for name in names if name not in AGAINST_TRUTH]),
+        ("Against the recorded motion", [metric for metric in metrics if metric.against_target]),
+        ("Distribution, variety, rhythm and smoothness", [metric for metric in metrics if not metric.against_target]),
     ):
-        head = [f"{METRICS[name].title}{_unit(name, about)} {_ARROWS[METRICS[name].better]}" for name in part]
+        head = [f"{metric.title}{_unit(metric, about)} {_ARROWS[metric.better]}" for metric in part]
         lines += [f"**{title}**", "", "| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(part) + 2)]
         for row in result["rows"]:
-            cells = [_cell(row["scores"].get(name), name) for name in part]
+            cells = [_cell(row["scores"].get(metric.key), metric) for metric in part]
             lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
         lines.append("")
     audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
@@ -63,13 +64,13 @@ def markdown(result: dict[str, Any]) -> str:
 
 def latex(result: dict[str, Any]) -> str:
     """A table for a paper (needs booktabs): means and, behind them in brackets, the best of the samples."""
-    names = _metrics(result)
-    head = " & ".join(["", *(f"{METRICS[name].title} {_LATEX_ARROWS[METRICS[name].better]}" for name in names)])
-    lines = [r"\begin{tabular}{l" + "r" * len(names) + "}", r"\toprule", head + r" \\", r"\midrule"]
+    metrics = _metrics(result)
+    head = " & ".join(["", *(f"{metric.title} {_LATEX_ARROWS[metric.better]}" for metric in metrics)])
+    lines = [r"\begin{tabular}{l" + "r" * len(metrics) + "}", r"\toprule", head + r" \\", r"\midrule"]
     for row in result["rows"]:
         cells = []
-        for name in names:
-            score, digits = row["scores"].get(name), METRICS[name].digits
+        for metric in metrics:
+            score, digits = row["scores"].get(metric.key), metric.digits
             if score is None:
                 cells.append("--")
                 continue
@@ -117,13 +118,20 @@ def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
     for report, result in results.items():
         for row in result["rows"]:
             if row["name"] in BASELINES:
-                baselines.setdefault(row["name"], row)
+                # One report may have metrics that another one lacks.
+                known = baselines.get(row["name"], row)
+                baselines[row["name"]] = {**known, "scores": row["scores"] | known["scores"]}
                 continue
             name = f"{row['name']} ({report})" if names.count(row["name"]) > 1 else row["name"]
             rows.append({**row, "name": name})
             if row["name"] in result.get("audits", {}):
                 audits[name] = result["audits"][row["name"]]
-    about = next(iter(results.values()))["about"]
+    about = dict(next(iter(results.values()))["about"])
+    extra = {
+        key: values for result in results.values() for key, values in result["about"].get("extra_metrics", {}).items()
+    }
+    if extra:
+        about["extra_metrics"] = extra
     return {"about": about, "rows": [*rows, *baselines.values()], "audits": audits}
 
 
@@ -165,23 +173,31 @@ def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
-def _metrics(result: dict[str, Any]) -> list[str]:
-    there = {name for row in result["rows"] for name in row["scores"]}
-    return [name for name in METRICS if name in there]
+def describe_metrics(metrics: Sequence[Metric]) -> dict[str, dict[str, Any]]:
+    """Titles, units and so on of metrics of other packages, for ``about``: the JSON is readable without them."""
+    names = ("title", "unit", "better", "source", "digits", "against_target")
+    return {metric.key: {name: getattr(metric, name) for name in names} for metric in metrics}
 
 
-def _unit(name: str, about: dict[str, Any]) -> str:
+def _metrics(result: dict[str, Any]) -> list[Metric]:
+    """The metrics that any row has."""
+    extra = {key: Metric(key=key, **values) for key, values in result["about"].get("extra_metrics", {}).items()}
+    scored = {name for row in result["rows"] for name in row["scores"]}
+    return [metric for metric in (METRICS | extra).values() if metric.key in scored]
+
+
+def _unit(metric: Metric, about: dict[str, Any]) -> str:
     """Lengths are centimetres and metres, or the corpus's own unit where it has no metres."""
-    unit = METRICS[name].unit
+    unit = metric.unit
     if unit and about.get("unit", "cm") != "cm":
         unit = unit.replace("cm", about["unit"]).replace("m/", f"{about['unit']}/")
     return f", {unit}" if unit else ""
 
 
-def _cell(score: dict[str, Any] | None, name: str) -> str:
+def _cell(score: dict[str, Any] | None, metric: Metric) -> str:
     if score is None:
         return "-"
-    digits = METRICS[name].digits
+    digits = metric.digits
     text = f"{score['mean']:.{digits}f}"
     if score["low"] is not None and score["low"] == score["low"]:
         text += f" [{score['low']:.{digits}f}, {score['high']:.{digits}f}]"
@@ -235,32 +251,30 @@ def _picture(result: dict[str, Any], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    names, rows = _metrics(result), result["rows"]
+    metrics, rows = _metrics(result), result["rows"]
     columns = 4
-    lines = -(-len(names) // columns)
+    lines = -(-len(metrics) // columns)
     height = 0.24 * len(rows) + 0.7
     figure, axes = pyplot.subplots(
         lines, columns, figsize=(13, lines * height), sharey=True, squeeze=False, layout="constrained"
     )
     models = sum(row["name"] not in BASELINES for row in rows)
-    for panel, name in zip(axes.flat, names, strict=False):
+    for panel, metric in zip(axes.flat, metrics, strict=False):
         for place, row in enumerate(rows):
-            score = row["scores"].get(name)
+            score = row["scores"].get(metric.key)
             if score is None:
                 continue
             colour = "#2f6fde" if place < models else "#b7c0cc"
             panel.barh(place, score["mean"], color=colour, height=0.7)
             if score["low"] is not None:
                 panel.plot([score["low"], score["high"]], [place, place], color="#1b2433", linewidth=1.4)
-        values = sorted(row["scores"][name]["mean"] for row in rows if name in row["scores"])
+        values = sorted(row["scores"][metric.key]["mean"] for row in rows if metric.key in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
             panel.set_xlim(0, 1.6 * values[-2])  # one row beyond all others would flatten them
-        panel.set_title(
-            f"{METRICS[name].title}{_unit(name, result['about'])} {_ARROWS[METRICS[name].better]}", fontsize=9
-        )
+        panel.set_title(f"{metric.title}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9)
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
-    for panel in list(axes.flat)[len(names) :]:
+    for panel in list(axes.flat)[len(metrics) :]:
         panel.set_visible(False)
     axes[0, 0].set_yticks(range(len(rows)), [row["name"] for row in rows])
     axes[0, 0].invert_yaxis()

@@ -16,8 +16,8 @@ from a2g_jax.evaluation.emotion_judge import load_emotion_judge, relevance
 from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
 from a2g_jax.evaluation.places import Body
-from a2g_jax.evaluation.report import check_comparable, latex, markdown, write_report
-from a2g_jax.evaluation.scores import Scorer, Target
+from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, write_report
+from a2g_jax.evaluation.scores import Metric, Scorer, Target
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
@@ -166,6 +166,21 @@ def test_a_single_recording_is_scored_in_pieces_and_the_report_says_so(corpus):
     assert (pieces["about"]["clips"], pieces["about"]["stretches"]) == (3, 1)
     assert pieces["about"]["seconds"] == 12.0
     assert "pieces of 1 recording(s), which are not independent" in markdown(pieces)
+
+
+def test_a_metric_of_another_package_has_its_column(corpus):
+    """The other scores do not change; the report is readable where that package is not installed."""
+    hands = Metric("hands", "cm", "lower", "ours", 1, key="hands", function=lambda motion: motion.wrists.max())
+    pairs = Metric("x", "", "higher", "ours", key="x", scope="pair", function=lambda pair: pair.positions.max())
+    spread = Metric("y", "", "truth", "ours", key="y", scope="clip", function=lambda clip: len(clip.motions))
+    plain, more = (evaluate({}, corpus, samples=2, extra_metrics=extra) for extra in ((), (hands, pairs, spread)))
+    assert score(more, "another right motion", "y") == 2.0
+    for before, after in zip(plain["rows"], more["rows"], strict=True):
+        assert {name: cell for name, cell in after["scores"].items() if name not in ("hands", "x", "y")} == before[
+            "scores"
+        ]
+    text = markdown(merge({"a": plain, "b": json.loads(json.dumps(more))}))
+    assert "hands, cm ↓" in text
 
 
 def test_reports_are_put_side_by_side(corpus, tmp_path, capsys):
