@@ -170,11 +170,11 @@ def check_copies(
         parts = (splits[copy.first], splits[copy.second]) if splits else (frozenset[str](), frozenset[str]())
         if splits and parts[0] and parts[1] and len(parts[0] | parts[1]) > 1:
             message += f", and they are in different splits ({_join(parts[0])}; {_join(parts[1])})."
-            mend = "Put both into one split; a test on what was trained on says nothing."
-            findings.append(Finding("warning", "leak", message, mend, place, copy.seconds))
+            fix = "Put both into one split; a test on what was trained on says nothing."
+            findings.append(Finding("warning", "leak", message, fix, place, copy.seconds))
         else:
-            mend = "Remove one, unless both are meant to be there."
-            findings.append(Finding("warning", "duplicate", f"{message}.", mend, place, copy.seconds))
+            fix = "Remove one, unless both are meant to be there."
+            findings.append(Finding("warning", "duplicate", f"{message}.", fix, place, copy.seconds))
     return findings
 
 

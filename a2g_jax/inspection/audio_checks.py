@@ -44,8 +44,8 @@ def check_clipping(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Fin
     if share < CLIPPED_SHARE:
         return []
     message = f"{100 * share:.2f} % of the samples are clipped at {peak_db(audio):.1f} dB of full scale."
-    mend = "Record at a lower level, or use the original before it was amplified."
-    return [Finding("warning", "clipping", message, mend, Place(seconds=first / sample_rate), share)]
+    fix = "Record at a lower level, or use the original before it was amplified."
+    return [Finding("warning", "clipping", message, fix, Place(seconds=first / sample_rate), share)]
 
 
 def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
@@ -61,8 +61,8 @@ def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Find
     for start, stop in edges[edges[:, 1] - edges[:, 0] >= SILENT_SECONDS / _BLOCK]:
         seconds = float((stop - start) * _BLOCK)
         message = f"silent for {seconds:.1f} s."
-        mend = "Cut it out, unless the speaker listens meanwhile."
-        findings.append(Finding("warning", "silence", message, mend, Place(seconds=float(start * _BLOCK)), seconds))
+        fix = "Cut it out, unless the speaker listens meanwhile."
+        findings.append(Finding("warning", "silence", message, fix, Place(seconds=float(start * _BLOCK)), seconds))
     return findings
 
 

@@ -89,8 +89,8 @@ def check_frame_count(file: BvhFile) -> list[Finding]:
     if there == file.claimed:
         return []
     message = f"the header says {file.claimed} frames and there are {there} lines of motion."
-    mend = f"Write 'Frames: {there}', or copy the file again if it was cut short."
-    return [Finding("warning", "frame-count", message, mend, Place(frame=min(there, file.claimed)), float(there))]
+    fix = f"Write 'Frames: {there}', or copy the file again if it was cut short."
+    return [Finding("warning", "frame-count", message, fix, Place(frame=min(there, file.claimed)), float(there))]
 
 
 def check_rows(file: BvhFile) -> tuple[list[Finding], Float[np.ndarray, "T C"]]:
@@ -147,7 +147,7 @@ def read_what_there_is(path: Path, file: BvhFile, frames: int) -> Motion | None:
         return None
     if frames == len(file.rows) == file.claimed:
         return read_bvh(path)
-    with _mended(file, frames) as temporary:
+    with _repaired(file, frames) as temporary:
         try:
             return read_bvh(temporary)
         except InputError as error:
@@ -155,9 +155,9 @@ def read_what_there_is(path: Path, file: BvhFile, frames: int) -> Motion | None:
 
 
 @contextmanager
-def _mended(file: BvhFile, frames: int) -> Iterator[Path]:
+def _repaired(file: BvhFile, frames: int) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mended.bvh"
+        path = Path(folder) / "repaired.bvh"
         rows = "\n".join(file.rows[:frames])
         path.write_text(f"{file.head}{frames}{file.middle}{rows}\n", encoding="utf-8")
         yield path

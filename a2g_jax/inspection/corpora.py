@@ -120,9 +120,9 @@ def check_sources(corpus: Corpus) -> list[Finding]:
         message = f"{len(names)} recordings were made from the same files ({', '.join(names[:4])}"
         message += f"{', ...' if len(names) > 4 else ''})"
         if len(members) == 2 and len(splits) > 1:
-            mend = "Put both into one split; a test on what was trained on says nothing."
+            fix = "Put both into one split; a test on what was trained on says nothing."
             message += f", and they are in different splits ({' and '.join(sorted(splits))})."
-            findings.append(Finding("warning", "leak", message, mend, Place(recording=names[1])))
+            findings.append(Finding("warning", "leak", message, fix, Place(recording=names[1])))
         else:
             # Databases hold many clips in one file; what they share is found by content.
             findings.append(Finding("info", "same-files", f"{message}.", value=float(len(names))))

@@ -24,8 +24,8 @@ def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
         return find_rig(motion, name=path), []
     except InputError as error:
         message = f"no body is found in the skeleton ({error})"
-        mend = "What needs a body (retargeting, speeds of the hands, the offset) is left out."
-        return None, [Finding("info", "no-body", " ".join(message.split()), mend)]
+        fix = "What needs a body (retargeting, speeds of the hands, the offset) is left out."
+        return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
 
 
 def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:

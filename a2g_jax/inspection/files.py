@@ -203,5 +203,5 @@ def check_words(words: tuple[Word, ...], audio_seconds: float) -> list[Finding]:
     if not late:
         return []
     message = f"{len(late)} words lie after the end of the audio at {audio_seconds:.2f} s, the first {late[0].text!r}."
-    mend = "Is it the transcript of another take?"
-    return [Finding("warning", "words-beyond", message, mend, Place(seconds=late[0].start), float(len(late)))]
+    fix = "Is it the transcript of another take?"
+    return [Finding("warning", "words-beyond", message, fix, Place(seconds=late[0].start), float(len(late)))]

@@ -33,7 +33,7 @@ class Finding:
     code: str
     """Which check says it, such as ``"frozen"``; stable, for scripts."""
     message: str
-    mend: str = ""
+    fix: str = ""
     """What to do about it."""
     place: Place = field(default_factory=Place)
     value: float | None = None
@@ -48,7 +48,7 @@ class Finding:
     def line(self) -> str:
         """One line of text."""
         where = f"{self.place}: " if str(self.place) else ""
-        return f"[{self.code}] {where}{self.message}{f' {self.mend}' if self.mend else ''}"
+        return f"[{self.code}] {where}{self.message}{f' {self.fix}' if self.fix else ''}"
 
 
 def located(findings: Iterable[Finding], *, path: str = "", recording: str = "") -> list[Finding]:

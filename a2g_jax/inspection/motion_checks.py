@@ -63,7 +63,7 @@ def check_frozen(motion: Motion, rig: Rig | None = None) -> list[Finding]:
                     "warning",
                     "frozen",
                     f"{label} does not turn at all for {seconds:.1f} s while other joints move.",
-                    "Was the marker lost, or the joint left out of the export? Mend it or cut the stretch out.",
+                    "Was the marker lost, or the joint left out of the export? Fix it or cut the stretch out.",
                     Place(joint=names[joints[-1]], frame=start, seconds=start / motion.fps),
                     seconds,
                 )
@@ -155,8 +155,8 @@ def check_repeats(motion: Motion) -> list[Finding]:
     if share < REPEATED_SHARE or still.all() or alone.sum() < 0.1 * len(still):
         return []
     message = f"{100 * share:.0f} % of the frames repeat the one before."
-    mend = f"The motion was recorded at about {motion.fps * (1 - share):.3g} fps; export it at that rate."
-    return [Finding("warning", "repeated", message, mend, value=share)]
+    fix = f"The motion was recorded at about {motion.fps * (1 - share):.3g} fps; export it at that rate."
+    return [Finding("warning", "repeated", message, fix, value=share)]
 
 
 def check_finite(values: Float[np.ndarray, "..."], what: str) -> list[Finding]:
@@ -167,8 +167,8 @@ def check_finite(values: Float[np.ndarray, "..."], what: str) -> list[Finding]:
         return []
     first = ", ".join(str(int(index)) for index in np.argwhere(bad)[0])
     message = f"{what} holds {count} values that are NaN or infinite, the first at [{first}]."
-    mend = "Find what wrote it; a network trained on it becomes NaN."
-    return [Finding("warning", "nan", message, mend, value=float(count))]
+    fix = "Find what wrote it; a network trained on it becomes NaN."
+    return [Finding("warning", "nan", message, fix, value=float(count))]
 
 
 def check_motion(motion: Motion, rig: Rig | None = None) -> list[Finding]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from a2g_jax.inspection.finding import Finding, warnings_of
 
-FORMAT, VERSION = "a2g_jax inspection", 1
+FORMAT, VERSION = "a2g_jax inspection", 2
 #: Findings of one code that text shows in full; JSON has them all.
 _SHOWN = 8
 
@@ -17,11 +17,11 @@ class Report:
 
     As JSON, stable within a version::
 
-        {"format": "a2g_jax inspection", "version": 1,
+        {"format": "a2g_jax inspection", "version": 2,
          "path": ..., "kind": "bvh" | "audio" | "transcript" | "motion npz" | "smplx npz" | "npz" | "pair" | "folder"
                               | "corpus" | "run" | "score",
          "facts": {section: {name: number, text, list or further names}},
-         "findings": [{"severity": "warning" | "info", "code", "message", "mend", "value": number or null,
+         "findings": [{"severity": "warning" | "info", "code", "message", "fix", "value": number or null,
                        "place": {"path", "recording", "joint", "frame", "seconds"} as far as they apply}]}
     """
 
@@ -70,7 +70,7 @@ class Report:
             for code in dict.fromkeys(finding.code for finding in chosen):
                 groups: dict[tuple[str, str], list[Finding]] = {}
                 for finding in (finding for finding in chosen if finding.code == code):
-                    groups.setdefault((finding.message, finding.mend), []).append(finding)
+                    groups.setdefault((finding.message, finding.fix), []).append(finding)
                 same = [
                     first.line() + (f" (The same in {len(more)} more places.)" if more else "")
                     for first, *more in groups.values()

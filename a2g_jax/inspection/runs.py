@@ -46,8 +46,8 @@ def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
     # Losses below zero, as of likelihoods, have no ratio.
     if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
         message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
-        mend = "It learns its corpus by heart: train on more recordings, or for fewer steps."
-        findings.append(Finding("info", "overfitting", message, mend, value=checked[-1] / min(checked)))
+        fix = "It learns its corpus by heart: train on more recordings, or for fewer steps."
+        findings.append(Finding("info", "overfitting", message, fix, value=checked[-1] / min(checked)))
     return findings
 
 

@@ -100,8 +100,8 @@ def check_offset(offset: Offset | None) -> list[Finding]:
         f"the hands move {abs(shift):.2f} s {'after' if shift > 0 else 'before'} the speech they go with "
         f"({offset.deviations:.1f} standard deviations above chance)."
     )
-    mend = f"Cut {abs(shift):.2f} s from the start of the {'motion' if shift > 0 else 'audio'}."
-    return [Finding("warning", "offset", message, mend, Place(seconds=0.0), shift)]
+    fix = f"Cut {abs(shift):.2f} s from the start of the {'motion' if shift > 0 else 'audio'}."
+    return [Finding("warning", "offset", message, fix, Place(seconds=0.0), shift)]
 
 
 def energy_db(audio: Float[np.ndarray, " N"], sample_rate: int, seconds: float) -> Float[np.ndarray, " K"]:

@@ -39,7 +39,7 @@ def test_wrong_rate(rate, tmp_path):
     assert codes(report.findings) == {"frame-time"}
     (found,) = (finding for finding in report.findings if finding.severity == "warning")
     assert found.value == pytest.approx(rate, rel=0.01)
-    assert f"Frame Time: {1 / found.value:.8f}" in found.mend
+    assert f"Frame Time: {1 / found.value:.8f}" in found.fix
 
 
 def test_broadcast_rate():
@@ -69,7 +69,7 @@ def test_offset_of_files(tmp_path):
     bvh, wav = write_pair(tmp_path, moved)
     report = inspect(bvh, wav)
     assert codes(report.findings) == {"offset"}, report.text()
-    assert "Cut 0.5" in report.findings[-1].mend
+    assert "Cut 0.5" in report.findings[-1].fix
 
 
 def test_offset_is_not_told_where_it_cannot_be():
