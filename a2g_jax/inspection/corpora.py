@@ -19,7 +19,7 @@ from a2g_jax.inspection.finding import Finding, Place, located
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.sync import Offset, at_rate, check_offset, measure_offset, wrist_places
-from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.inspection.tree import body_facts
 from a2g_jax.progress import progress_bar
 
 #: A standard deviation so far above the median one, or 0, is of a feature with outliers or without content.
@@ -169,15 +169,7 @@ def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
     }
     if corpus.on_demand:
         facts["corpus"]["generated in training"] = f"{corpus.parts - 1} more parts"
-    if isinstance(corpus.body, Skeleton):
-        facts["skeleton"] = skeleton_facts(corpus.body, rig)
-    else:
-        names = corpus.body.names
-        facts["points"] = {
-            "names": list(names),
-            "bones": [f"{names[start]}-{names[end]}" for start, end in corpus.body.bones],
-        }
-    return facts
+    return facts | body_facts(corpus.body, rig)
 
 
 def _minutes(corpus: Corpus, label: str) -> dict[str, float]:

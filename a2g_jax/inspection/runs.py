@@ -10,7 +10,7 @@ from flax.traverse_util import flatten_dict
 
 from a2g_jax.inspection.finding import Finding
 from a2g_jax.inspection.report import Report
-from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.inspection.tree import body_facts
 from a2g_jax.training.run import Run, load_run
 
 _METRICS = "metrics.jsonl"
@@ -66,6 +66,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
             "parameters": sum(sizes.values()),
             "of which": parts,
             "fps": config.fps,
+            "pose": f"{config.representation}, {config.statistics['pose'].mean.shape[0]} rows",
             "audio": f"{config.mel.width} values a frame at {config.mel.sample_rate} Hz",
         },
         "corpus": {
@@ -85,8 +86,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
         facts["last losses"] = {
             split: {name: value for name, value in line.items() if name != "split"} for split, line in last.items()
         }
-    facts["skeleton"] = skeleton_facts(config.skeleton)
-    return facts
+    return facts | body_facts(config.body)
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:

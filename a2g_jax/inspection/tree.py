@@ -1,9 +1,10 @@
-"""A skeleton as a drawn tree."""
+"""What moves in a motion: a skeleton, as a drawn tree, or points and bones."""
 
 from typing import Any
 
 import numpy as np
 
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.geometry.skeleton import Skeleton
 
@@ -27,6 +28,19 @@ def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]
         for joint, (name, parent, length) in enumerate(zip(skeleton.names, skeleton.parents, lengths, strict=True))
     ]  # fmt: skip
     return facts
+
+
+def body_facts(body: Skeleton | PoseLayout, rig: Rig | None = None) -> dict[str, Any]:
+    """The section of a report on what moves: ``skeleton``, or ``points`` where poses are keypoints or directions."""
+    if isinstance(body, Skeleton):
+        return {"skeleton": skeleton_facts(body, rig)}
+    points: dict[str, Any] = {
+        "names": list(body.names),
+        "bones": [f"{body.names[start]}-{body.names[end]}" for start, end in body.bones],
+    }
+    if body.lengths:
+        points["bone lengths (cm)"] = [round(100 * length, 2) for length in body.lengths]
+    return {"points": points}
 
 
 def draw_tree(facts: dict[str, Any]) -> list[str]:

@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
@@ -14,10 +15,12 @@ from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
+from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout, PoseTrack
 from a2g_jax.inspection.command import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.training.run import Run, save_run
 
 DEMO = Path(__file__).parents[2] / "a2g_jax" / "demo"
 
@@ -221,6 +224,22 @@ def test_run(tmp_path):
         "nan": "warning",
     }
     assert report.facts["last losses"]["validation"]["loss"] == 1.4
+
+
+@pytest.mark.parametrize(("kind", "rows", "width"), [("directions", 2, 3), ("keypoints", 3, 2)])
+def test_run_without_a_skeleton(kind, rows, width, toy_run_config, tmp_path):
+    layout = PoseLayout(("hip", "neck", "hand"), ((0, 1), (1, 2)), (0.5, 0.6) if kind == "directions" else ())
+    config = toy_run_config()
+    pose = Statistics(np.zeros((rows, width), np.float32), np.ones((rows, width), np.float32))
+    config = replace(config, body=layout, representation=kind, statistics={**config.statistics, "pose": pose})
+    code = np.ones((1, config.model_config.code_channels), np.float32)
+    summary = {"specific_mean": code, "specific_std": code}
+    save_run(tmp_path / "run", Run(config, config.build().init(jax.random.key(0)), summary, 30))
+    report = inspect(tmp_path / "run")
+    assert report.facts["points"]["bones"] == ["hip-neck", "neck-hand"]
+    assert ("bone lengths (cm)" in report.facts["points"]) == (kind == "directions")
+    assert report.facts["run"]["pose"] == f"{kind}, {rows} rows"
+    assert "hip-neck" in report.text()
 
 
 def test_cast_is_varied():
