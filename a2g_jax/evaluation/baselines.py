@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_space import represent
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
+from a2g_jax.geometry.pose_space import represent, rotations_from_rows
+from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_axis_angle
 from a2g_jax.talker.recordings import resample_motion, talk
 
 Pose = Float[np.ndarray, "T R D"]
@@ -51,15 +51,24 @@ def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:
     return np.asarray(corpus.pose[rows])
 
 
-def with_noise(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
-    """The truth with every joint turned, anew in each frame, about a random axis (Audio2Gestures, Table 4).
+def with_noise(pose: Pose, degrees: float, rng: np.random.Generator, kind: str = "6d") -> Pose:
+    """The truth with every joint turned, independently in each frame, about a random axis (Audio2Gestures, Table 4).
 
     Args:
         degrees: standard deviation of each component of the turn.
+        kind: representation of the pose, ``"6d"`` or ``"exponential"``.
     """
     turns = matrix_from_axis_angle(jnp.asarray(rng.normal(0.0, np.deg2rad(degrees), (*pose.shape[:2], 3)), jnp.float32))
-    rotations = np.asarray(matrix_from_6d(np.asarray(pose, np.float32))) @ np.asarray(turns)
-    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*pose.shape)
+    return _from_rotations(rotations_from_rows(np.asarray(pose, np.float32), kind) @ np.asarray(turns), kind)
+
+
+def _from_rotations(rotations: Float[np.ndarray, "T R 3 3"], kind: str) -> Pose:
+    if kind == "exponential":
+        return np.asarray(_axis_angle(rotations))
+    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6)
+
+
+_axis_angle = jax.jit(axis_angle_from_matrix)
 
 
 def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:

@@ -214,10 +214,13 @@ def _candidates(
 
         yield name, model
     truth = lambda number: np.asarray(corpus.pose[segments[number].start : segments[number].stop])  # noqa: E731
-    rotates = corpus.representation == "6d"
-    noise = lambda number, degrees: (  # noqa: E731
-        [candidates.with_noise(truth(number), degrees, np.random.default_rng([seed, number]))] if rotates else None
-    )
+
+    def noise(number: int, degrees: float) -> list[Pose] | None:
+        if not isinstance(corpus.body, Skeleton):
+            return None
+        rng = np.random.default_rng([seed, number])
+        return [candidates.with_noise(truth(number), degrees, rng, corpus.representation)]
+
     baselines: tuple[_Draw, ...] = (
         lambda number: [truth(number)],
         lambda number: candidates.right_motions(corpus, segments[number], samples, seed),

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -18,6 +19,8 @@ from a2g_jax.evaluation.feature_network import load_feature_network
 from a2g_jax.evaluation.places import Body
 from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, write_report
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
+from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.rotation import axis_angle_from_matrix
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
@@ -76,6 +79,28 @@ def test_more_noise_is_worse(result):
         assert score(result, "truth", metric) < little < much, metric
     # Three components of one degree each turn a joint by 2 sqrt(2 / pi) degrees on average.
     assert score(result, "truth, 1 degree of noise", "mpjre") == pytest.approx(2 * np.sqrt(2 / np.pi), rel=0.03)
+
+
+def test_noise_is_the_same_in_every_representation_of_rotations(corpus):
+    """Noise on exponential maps turns joints by the angles of noise on 6D."""
+    pose = np.asarray(corpus.pose[:50])
+    rotations = rotations_from_rows(pose, "6d")
+    maps = np.asarray(axis_angle_from_matrix(jnp.asarray(rotations)))
+    noisy = candidates.with_noise(pose, 5.0, np.random.default_rng(0))
+    same = candidates.with_noise(maps, 5.0, np.random.default_rng(0), "exponential")
+    assert same.shape == maps.shape
+    np.testing.assert_allclose(rotations_from_rows(same, "exponential"), rotations_from_rows(noisy, "6d"), atol=1e-4)
+
+
+def test_exponential_maps_have_their_noise_rows(corpus, tmp_path):
+    features = Features(pose="exponential")
+    roles = corpus.recipe["roles"][:2]
+    rows = (prepare_recording(talk(**{**role, "seconds": 5.0}), features) for role in roles)
+    maps = write_corpus(tmp_path / "corpus", rows, features=features, recipe={"reader": "folder"})
+    table = evaluate({}, maps, split="train", samples=1)
+    little, much = (score(table, f"truth, {name} of noise", "mpjre") for name in ("1 degree", "5 degrees"))
+    assert little == pytest.approx(2 * np.sqrt(2 / np.pi), rel=0.05)
+    assert much > 4 * little
 
 
 def test_other_right_motions_are_the_floor(result):
