@@ -1,6 +1,6 @@
-"""What is scored beside a model: the truth, other right motions, and motions that are nobody's answer to the audio.
+"""Baselines: other right motions for the audio, noise, and motions that do not depend on the audio.
 
-Every candidate is poses of one test stretch, as the corpus writes them down, as many frames as the stretch has.
+Each is poses for one test stretch, in the representation of the corpus and of the length of the stretch.
 """
 
 from typing import Any
@@ -19,14 +19,14 @@ from a2g_jax.talker.recordings import resample_motion, talk
 
 Pose = Float[np.ndarray, "T R D"]
 
-#: Seconds of audio that are looked up at once in the training split.
+#: Length of the audio windows of :func:`nearest_neighbour`, seconds.
 NEIGHBOUR_SECONDS = 4.0
-#: Stretches compared at once: bounds memory at about 50 MB.
+#: Windows compared at once: bounds memory at about 50 MB.
 _CHUNK = 1500
 
 
 def mean_pose(corpus: Corpus, segment: Segment) -> Pose:
-    """The training split's mean pose, standing still."""
+    """The mean pose of the training split in every frame."""
     return np.tile(_mean(corpus)[None], (segment.frames, 1, 1)).astype(np.float32)
 
 
@@ -38,9 +38,9 @@ def _mean(corpus: Corpus) -> Float[np.ndarray, "R D"]:
 
 
 def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:
-    """The motion of the next test stretch, begun anew where it is shorter; of a single one, its own second half first.
+    """The motion of the next test stretch, repeated where it is shorter; of a single one, its second half first.
 
-    Someone's real motion, but not to this audio.
+    Recorded motion, but of other audio.
     """
     segment = segments[number]
     if len(segments) == 1:
@@ -72,12 +72,12 @@ _axis_angle = jax.jit(axis_angle_from_matrix)
 
 
 def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
-    """The training motion whose audio is most like this one's, four seconds at a time.
+    """The training motion whose audio is most similar, in windows of four seconds.
 
-    Distance is that of normalised log-mel rows; training audio is tried at every half second.
+    Euclidean distance of normalised log-mel rows; training windows start every half second.
 
     Raises:
-        InputError: no training stretch is that long.
+        InputError: no training stretch is as long as a window.
     """
     window = min(segment.frames, round(NEIGHBOUR_SECONDS * corpus.fps))
     step = max(1, round(0.5 * corpus.fps))
@@ -86,27 +86,29 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
             row
             for one in corpus.segments("train")
             for row in range(one.start, one.stop - window + 1, step)
-            # Where the training split itself is scored, nothing is its own neighbour.
+            # A stretch of the training split is not its own neighbour.
             if row >= segment.stop or row + window <= segment.start
         ],
         np.int64,
     )
     if len(starts) == 0:
-        raise InputError(f"{corpus.path}: has no other training stretch of {window} frames to look neighbours up in.")
-    # The last stretch ends with the clip, and overlaps the one before it.
+        raise InputError(
+            f"{corpus.path}: has no other training stretch of {window} frames for neighbours; prepare more."
+        )
+    # The last window ends with the clip and overlaps the one before.
     firsts = [*range(0, segment.frames - window + 1, window)]
     if firsts[-1] + window < segment.frames:
         firsts.append(segment.frames - window)
     wanted = _windows(corpus, segment.start + np.array(firsts), window)
     best, least = np.zeros(len(firsts), np.int64), np.full(len(firsts), np.inf)
     for chunk in range(0, len(starts), _CHUNK):
-        some = starts[chunk : chunk + _CHUNK]
-        there = _windows(corpus, some, window)
-        # |a - b|^2 without |b|^2, which is the same for all.
-        distance = np.sum(np.square(there), axis=1)[:, None] - 2.0 * there @ wanted.T
+        chunk_starts = starts[chunk : chunk + _CHUNK]
+        candidates = _windows(corpus, chunk_starts, window)
+        # |a - b|^2 without |b|^2, which is constant.
+        distance = np.sum(np.square(candidates), axis=1)[:, None] - 2.0 * candidates @ wanted.T
         nearest = np.argmin(distance, axis=0)
         values = distance[nearest, np.arange(len(firsts))]
-        best = np.where(values < least, some[nearest], best)
+        best = np.where(values < least, chunk_starts[nearest], best)
         least = np.minimum(values, least)
     pose = np.empty((segment.frames, *corpus.pose.shape[1:]), np.float32)
     for first, start in zip(firsts, best, strict=True):
@@ -115,16 +117,16 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
 
 
 def _windows(corpus: Corpus, starts: Int[np.ndarray, " n"], frames: int) -> Float[np.ndarray, "n values"]:
-    """Normalised audio rows from each start on, side by side."""
+    """Normalised audio rows of the windows, flattened."""
     rows = np.asarray(corpus.audio)[starts[:, None] + np.arange(frames)[None]]
     return np.asarray(corpus.statistics["audio"].normalise(rows), np.float32).reshape(len(starts), -1)
 
 
 def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> list[Pose] | None:
-    """Other motions that are right for the same audio, drawn from the generator itself; None for real recordings.
+    """Other right motions for the same audio, drawn from the talker; None for real recordings.
 
     Raises:
-        InputError: the corpus was generated by another version.
+        InputError: the corpus was generated by another version of the talker.
     """
     role = _role(corpus, segment)
     if role is None:
@@ -143,7 +145,7 @@ def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> 
 
 
 def _role(corpus: Corpus, segment: Segment) -> dict[str, Any] | None:
-    """How a generated recording was made, if it was, and shown as it is."""
+    """Arguments of a generated recording; None for real ones and for altered views."""
     recipe = corpus.recipe
     if recipe.get("reader") != "talker" or recipe.get("view", "body") != "body" or recipe.get("jitter", 0.0) != 0.0:
         return None

@@ -1,4 +1,4 @@
-"""A table of candidates on a split: models, the truth, and what is neither."""
+"""Scores of models and baselines on a split."""
 
 import hashlib
 import json
@@ -13,7 +13,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import baselines as candidates
-from a2g_jax.evaluation.audit import Heard, listening_audit
+from a2g_jax.evaluation.audit import AudioCondition, listening_audit
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.places import Body, Pose
@@ -28,12 +28,12 @@ from a2g_jax.metrics.distribution import split_floor
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.training.run import Run
 
-#: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
+#: Longest stretch that is scored, frames (Audio2Gestures, Sec. 5.3.1).
 MOST_FRAMES = 5000
-#: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer stretches than this are cut into pieces
-#: of that length, so that there is anything to draw intervals from.
+#: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer than three stretches are cut into
+#: pieces of that length, for intervals over clips.
 _LEAST_FRAMES, _FEW = 100, 3
-#: How much is generated again and again to see whether a model listens.
+#: Clips of an audit, and their length in seconds.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
 
 
@@ -43,29 +43,29 @@ class Row:
 
     name: str
     samples: int
-    """Motions for each clip."""
+    """Number of motions for each clip."""
     scores: dict[str, dict[str, Any]]
-    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, averaged over clips)."""
+    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips)."""
 
 
 def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
-    """Refuse runs whose motion cannot be compared on a corpus.
+    """Refuse runs that do not fit a corpus.
 
     Raises:
-        InputError: another skeleton, frame rate or audio feature.
+        InputError: another representation, skeleton, frame rate or audio feature.
     """
     for name, run in runs.items():
         config = run.config
         if config.representation != corpus.representation:
             raise InputError(
-                f"{name}: makes {config.representation}, but {corpus.path} holds {corpus.representation}; prepare that"
-                f" with --pose {config.representation}."
+                f"{name}: generates {config.representation}, but {corpus.path} holds {corpus.representation};"
+                f" prepare that with --pose {config.representation}."
             )
         if not _same_body(config.body, corpus.body):
-            raise InputError(f"{name}: moves another skeleton than {corpus.path} has; train one on such a corpus.")
+            raise InputError(f"{name}: has another skeleton than {corpus.path}; train on such a corpus.")
         if config.fps != corpus.fps or config.mel != corpus.mel:
             raise InputError(
-                f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, otherwise made than the"
+                f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, with other settings than the"
                 f" {corpus.mel.width} at {corpus.fps:g} fps of {corpus.path}; prepare that with its features."
             )
 
@@ -93,13 +93,16 @@ def evaluate(
     """Score runs and baselines; JSON-able.
 
     Args:
-        samples: motions that each run makes for each clip.
-        network: without one, FGD, LPIPS and what is told of groups are left out.
-        judge: without one, emotion accuracy is left out.
-        baselines: whether the rows beside the runs are scored too.
+        runs: runs by name.
+        split: a split of the corpus.
+        samples: motions of each run for each clip.
+        seed: seed of samples, noise and bootstrap.
+        network: for FGD, LPIPS and the grouping of speakers; left out without one.
+        judge: for emotion accuracy; left out without one.
+        audit: whether to audit each run (:mod:`a2g_jax.evaluation.audit`).
+        baselines: whether to score the baselines too.
         extra_metrics: metrics of other packages (:func:`~a2g_jax.metrics.registry.find_metrics`).
-        audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
-        report: called with how many (candidate, clip) pairs are done, of how many.
+        report: called with the number of (candidate, clip) pairs done, and their total.
 
     Raises:
         InputError: runs that do not fit the corpus, or a split without a stretch long enough.
@@ -162,7 +165,7 @@ def evaluate(
 
 
 def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], seed: int) -> dict[str, Any]:
-    """On the first half minute of a few clips."""
+    """The audit on the first half minute of a few clips."""
     generator, chosen = Generator(run), segments[:_AUDIT_CLIPS]
     frames = [min(segment.frames, round(_AUDIT_SECONDS * corpus.fps)) for segment in chosen]
     clips = [
@@ -171,15 +174,15 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
     ]
     speakers = [corpus.recordings[segment.recording].speaker for segment in chosen]
 
-    def listen(heard: Heard, number: int) -> np.ndarray:
-        rows = next(generator.rows(np.asarray(heard.features, np.float32), 1, (seed + number) % 2**31))
+    def generate(audio: AudioCondition, number: int) -> np.ndarray:
+        rows = next(generator.rows(np.asarray(audio.features, np.float32), 1, (seed + number) % 2**31))
         return scorer.body.wrists(scorer.body.places(rows))
 
-    return listening_audit(listen, clips, speakers, corpus.fps)
+    return listening_audit(generate, clips, speakers, corpus.fps)
 
 
 def _pieces(segment: Segment, frames: int) -> list[Segment]:
-    """A stretch cut into clips of so many frames, the last one longer by the remainder."""
+    """A stretch cut into clips of a number of frames, the last one longer by the remainder."""
     starts = range(segment.start, segment.stop - 2 * frames + 1, frames)
     bounds = [*starts, segment.start + len(starts) * frames, segment.stop]
     return [Segment(segment.recording, start, stop) for start, stop in zip(bounds, bounds[1:], strict=False)]
@@ -202,7 +205,7 @@ _Draw = Callable[[int], list[Pose] | None]
 def _candidates(
     runs: dict[str, Run], corpus: Corpus, segments: list[Segment], samples: int, seed: int
 ) -> Iterator[tuple[str, _Draw]]:
-    """Each candidate's name, and the function that gives its motions for a clip (None if there are none)."""
+    """Each candidate's name, and a function from a clip to its motions (None if there are none)."""
     for name, run in runs.items():
         generator = Generator(run)
 

@@ -1,4 +1,4 @@
-"""The table of an evaluation as JSON, Markdown, LaTeX and a picture."""
+"""The report of an evaluation as JSON, Markdown, LaTeX and a picture."""
 
 import json
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from a2g_jax.evaluation.scores import METRICS, Metric
 from a2g_jax.io.files import atomic_path, make_folder, read_json
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
-#: What is scored beside the models, in the order of the table.
+#: Baselines, in the order of the table.
 BASELINES = (
     "truth",
     "another right motion",
@@ -45,7 +45,7 @@ def write_report(result: dict[str, Any], out: Path) -> list[Path]:
 
 
 def markdown(result: dict[str, Any]) -> str:
-    """The table with what it is of and how it is read."""
+    """The tables with their conditions and notes on how to read them."""
     about, metrics = result["about"], _metrics(result)
     lines = []
     for title, part in (
@@ -63,7 +63,7 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def latex(result: dict[str, Any]) -> str:
-    """A table for a paper (needs booktabs): means and, behind them in brackets, the best of the samples."""
+    """A table for a paper (needs booktabs): means, with the best of the samples in brackets."""
     metrics = _metrics(result)
     head = " & ".join(["", *(f"{metric.title} {_LATEX_ARROWS[metric.better]}" for metric in metrics)])
     lines = [r"\begin{tabular}{l" + "r" * len(metrics) + "}", r"\toprule", head + r" \\", r"\midrule"]
@@ -82,13 +82,13 @@ def latex(result: dict[str, Any]) -> str:
 
 
 def check_comparable(results: dict[str, dict[str, Any]]) -> None:
-    """Refuse to put reports side by side that are not of the same thing.
+    """Refuse to compare reports of different conditions.
 
     Args:
-        results: contents of ``report.json`` files by their names.
+        results: contents of ``report.json`` files by name.
 
     Raises:
-        InputError: of different skeletons, corpora, splits, numbers of samples or feature networks.
+        InputError: different skeletons, corpora, splits, numbers of samples, feature networks or classifiers.
     """
     (first, reference), *others = results.items()
     for name, result in others:
@@ -102,10 +102,10 @@ def check_comparable(results: dict[str, dict[str, Any]]) -> None:
 
 
 def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Reports of the same thing as one: every model of each, and the baselines once.
+    """Several reports as one: the models of all, and the baselines once.
 
     Args:
-        results: contents of ``report.json`` files by their names.
+        results: contents of ``report.json`` files by name.
 
     Raises:
         InputError: see :func:`check_comparable`.
@@ -119,8 +119,8 @@ def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
         for row in result["rows"]:
             if row["name"] in BASELINES:
                 # One report may have metrics that another one lacks.
-                known = baselines.get(row["name"], row)
-                baselines[row["name"]] = {**known, "scores": row["scores"] | known["scores"]}
+                earlier = baselines.get(row["name"], row)
+                baselines[row["name"]] = {**earlier, "scores": row["scores"] | earlier["scores"]}
                 continue
             name = f"{row['name']} ({report})" if names.count(row["name"]) > 1 else row["name"]
             rows.append({**row, "name": name})
@@ -139,7 +139,7 @@ def read_report(folder: Path) -> dict[str, Any]:
     """The contents of a report's ``report.json``.
 
     Raises:
-        InputError: there is none, or it is not a report's.
+        InputError: no such file, or not a report.
     """
     path = folder / "report.json"
     if not path.is_file():
@@ -150,19 +150,19 @@ def read_report(folder: Path) -> dict[str, Any]:
         or not isinstance(value.get("about"), dict)
         or not isinstance(value.get("rows"), list)
     ):
-        raise InputError(f"{path}: is not a report of 'a2g evaluate'; make it anew.")
+        raise InputError(f"{path}: is not a report of 'a2g evaluate'; run that again.")
     return value
 
 
 def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
-    """Whether a run listens, as a section."""
+    """The section of a run's audit."""
     lines = [
         f"## Does {name} listen?",
         "",
         f"{'; '.join(audit['verdicts'])}. ({audit['clips']} clips; another seed changes the wrists' motion by"
         f" {audit['sampling_cm']:.1f} cm.)",
         "",
-        "| heard | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
+        "| audio | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
         "| --- | --- | --- | --- |",
     ]
     for condition, row in audit["conditions"].items():
@@ -217,28 +217,29 @@ def _preface(about: dict[str, Any]) -> list[str]:
 
 
 def _notes(about: dict[str, Any]) -> list[str]:
-    few = " There are few clips, so intervals are wide and understate what is not known." if about["clips"] < 10 else ""
+    few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
     if about["clips"] > about["stretches"]:
         few = (
-            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals are"
-            " narrower than what is not known, and say nothing about other recordings or speakers."
+            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals"
+            " understate the uncertainty, and do not extend to other recordings or speakers."
         )
     notes = [
         "Brackets hold 95 % intervals over clips (bootstrap)." + few,
         "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",
-        "↓ less is better, ↑ more is better, ≈ as the truth is better. Beat alignment has no zero: see what the other"
-        " rows score. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at 20.",
-        "No score here is a claim about what people would prefer.",
+        "↓ lower is better, ↑ higher is better, ≈ nearer to the truth is better. Beat alignment has no zero: compare"
+        " with the other rows. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at"
+        " 20 samples.",
+        "No score here measures what people prefer.",
     ]
     if about["feature_network"] is not None:
         floor = "" if about["floor"] is None else f" two halves of the truth are {about['floor']:.2f} apart;"
         notes.append(
-            f"FGD and LPIPS are by the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
-            f" vectors a set;{floor} FGD falls with n."
+            f"FGD and LPIPS use the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
+            f" vectors in a set;{floor} FGD falls with n."
             + (
                 ""
                 if about.get("own_features", True)
-                else " The network was trained on another corpus: movement that was rare there weighs too much here."
+                else " The network was trained on another corpus: movement that is rare there has too much weight here."
             )
         )
     return [f"- {note}" for note in notes]
@@ -270,7 +271,7 @@ def _picture(result: dict[str, Any], path: Path) -> None:
                 panel.plot([score["low"], score["high"]], [place, place], color="#1b2433", linewidth=1.4)
         values = sorted(row["scores"][metric.key]["mean"] for row in rows if metric.key in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
-            panel.set_xlim(0, 1.6 * values[-2])  # one row beyond all others would flatten them
+            panel.set_xlim(0, 1.6 * values[-2])  # so that one row far beyond the others does not flatten them
         panel.set_title(f"{metric.title}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9)
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)

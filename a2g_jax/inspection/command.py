@@ -9,7 +9,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.inspection.corpora import inspect_corpus
 from a2g_jax.inspection.files import Inspected, inspect_file, inspect_together
 from a2g_jax.inspection.folders import inspect_folder
-from a2g_jax.inspection.likelihood import score_file, score_report
+from a2g_jax.inspection.likelihood import file_likelihood, likelihood_report
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.runs import inspect_run
 from a2g_jax.training.run import RUN_FILE
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> int:
     """``a2g inspect``; returns the exit status: 1 if ``--strict`` was asked for and there are warnings, else 0."""
     audio = Path(options.audio) if options.audio else None
     if options.score is None and options.picture is not None:
-        raise InputError("--picture: draws a score; add --score MOTION, or leave it out.")
+        raise InputError("--picture: draws a likelihood; add --score MOTION, or leave it out.")
     report = inspect(Path(options.path), audio) if options.score is None else _score(options, audio)
     print(
         json.dumps(report.to_json(), indent=2, ensure_ascii=False, allow_nan=False) if options.json else report.text()
@@ -57,10 +57,10 @@ def _score(options: argparse.Namespace, audio: Path | None) -> Report:
     picture = None if options.picture is None else Path(options.picture)
     if picture is not None and picture.suffix.lower() != ".png":
         raise InputError(f"--picture {picture}: expected a name that ends in .png.")
-    score = score_file(Path(options.path), Path(options.score), audio)
+    likelihood = file_likelihood(Path(options.path), Path(options.score), audio)
     if picture is not None:
         # Late, since Matplotlib is optional.
         from a2g_jax.inspection.likelihood_plot import save_likelihood
 
-        save_likelihood(picture, score.seconds, score.log_likelihood, score.moments)
-    return score_report(score, Path(options.score), curve=options.json)
+        save_likelihood(picture, likelihood.seconds, likelihood.log_likelihood, likelihood.moments)
+    return likelihood_report(likelihood, Path(options.score), curve=options.json)

@@ -19,7 +19,7 @@ class Report:
 
         {"format": "a2g_jax inspection", "version": 2,
          "path": ..., "kind": "bvh" | "audio" | "transcript" | "motion npz" | "smplx npz" | "npz" | "pair" | "folder"
-                              | "corpus" | "run" | "score",
+                              | "corpus" | "run" | "likelihood",
          "facts": {section: {name: number, text, list or further names}},
          "findings": [{"severity": "warning" | "info", "code", "message", "fix", "value": number or null,
                        "place": {"path", "recording", "joint", "frame", "seconds"} as far as they apply}]}

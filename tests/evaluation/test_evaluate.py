@@ -140,7 +140,7 @@ def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config
 def test_reports_say_what_they_are_of(result):
     text = markdown(result)
     assert "| mean pose | 1 |" in text
-    assert "No score here is a claim" in text
+    assert "No score here measures" in text
     assert result["about"]["feature_network"][:16] in text
     assert latex(result).count(r"\\") == len(result["rows"]) + 1
     json.dumps(result, allow_nan=False)
