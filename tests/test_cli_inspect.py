@@ -93,7 +93,7 @@ def test_words_after_the_end(files, capsys):
 def test_errors_name_what_is_wrong(files, tmp_path):
     for arguments, message in (
         ([tmp_path / "no.bvh"], "no such file"),
-        ([__file__], "nothing that can be inspected"),
+        ([__file__], "cannot be inspected"),
         ([files / "other.npz", "--audio", files / "a.wav"], "neither a motion nor a transcript"),
         ([files / "a.bvh", "--audio", files / "a.bvh"], "is no audio"),
         ([tmp_path, "--audio", files / "a.wav"], "is a folder"),

@@ -18,14 +18,13 @@ from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.places import Body, Pose
 from a2g_jax.evaluation.report import BASELINES, describe_metrics
-from a2g_jax.evaluation.scores import METRICS, Metric, Scorer, Target
+from a2g_jax.evaluation.scores import Metric, Scorer, Target
+from a2g_jax.evaluation.summary import summarise
 from a2g_jax.generation.engine import Generator
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.context import SetContext
 from a2g_jax.metrics.distribution import split_floor
-from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.training.run import Run
 
 #: Longest stretch that is scored, frames (Audio2Gestures, Sec. 5.3.1).
@@ -139,7 +138,7 @@ def evaluate(
             per_group.append(scorer.clip_scores(motions))
             features.append([scorer.features(pose) for pose in poses])
         if per_clip:
-            rows.append(Row(name, count, _summary(scorer, per_clip, per_group, features, reference, speakers, seed)))
+            rows.append(Row(name, count, summarise(scorer, per_clip, per_group, features, reference, speakers, seed)))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -234,78 +233,6 @@ def _candidates(
         lambda number: [candidates.mean_pose(corpus, segments[number])],
     )
     yield from zip(BASELINES, baselines, strict=True)
-
-
-def _summary(
-    scorer: Scorer,
-    per_clip: list[list[dict[str, float]]],
-    per_group: list[dict[str, float]],
-    features: list[list[np.ndarray]],
-    reference: np.ndarray,
-    speakers: list[str],
-    seed: int,
-) -> dict[str, dict[str, Any]]:
-    """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips.
-
-    Args:
-        per_clip: scores of every sample of every clip.
-        per_group: scores of every clip's samples together.
-    """
-    # The same draws for the same metric, whatever metrics of other packages there are.
-    rng = np.random.default_rng(seed)
-    own, extra = tuple(METRICS.values()), scorer.extra_metrics
-    summary: dict[str, dict[str, Any]] = {}
-    for metrics in (own, extra):
-        for metric in metrics:
-            if metric.per_sample and (cell := _sample_cell(metric, per_clip, rng)) is not None:
-                summary[metric.key] = cell
-        for metric in metrics:
-            values = np.array([scores.get(metric.key, np.nan) for scores in per_group])
-            if metric.scope == "clip" and not np.isnan(values).all():
-                summary[metric.key] = {**bootstrap_mean(values, rng)._asdict(), "best": None}
-    return summary | _set_cells(scorer, features, reference, speakers)
-
-
-def _sample_cell(
-    metric: Metric, per_clip: list[list[dict[str, float]]], rng: np.random.Generator
-) -> dict[str, Any] | None:
-    values = np.array([[scores.get(metric.key, np.nan) for scores in clip] for clip in per_clip])
-    if np.isnan(values).all():
-        return None
-    # A clip too short for a metric has no value in any sample.
-    values = values[~np.isnan(values).all(axis=1)]
-    interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
-    best = {"lower": np.nanmin, "higher": np.nanmax}.get(metric.better)
-    return {
-        "mean": interval.mean,
-        "low": interval.low,
-        "high": interval.high,
-        "best": None if best is None else float(np.nanmean(best(values, axis=1))),
-    }
-
-
-def _set_cells(
-    scorer: Scorer, features: list[list[np.ndarray]], reference: np.ndarray, speakers: list[str]
-) -> dict[str, dict[str, Any]]:
-    """One set of vectors for each sample number, over all clips, so that there are as many as of the truth."""
-    numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
-    sets = []
-    for sample in range(len(features[0])):
-        labels = [np.full(len(clip[sample]), numbers[name]) for clip, name in zip(features, speakers, strict=True)]
-        vectors = np.concatenate([clip[sample] for clip in features])
-        sets.append(scorer.set_scores(SetContext(vectors, reference, np.concatenate(labels))))
-    cells = {}
-    for metric in scorer.metrics:
-        values = [scores[metric.key] for scores in sets if metric.key in scores]
-        if metric.scope == "set" and len(values) == len(sets):
-            best = {"lower": min, "higher": max}.get(metric.better)
-            cells[metric.key] = {
-                "mean": float(np.mean(values)),
-                "low": None,
-                "high": None,
-                "best": None if best is None else float(best(values)),
-            }
-    return cells
 
 
 def _fingerprint(corpus: Corpus) -> str:

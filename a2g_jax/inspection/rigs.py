@@ -1,4 +1,4 @@
-"""Skeletons of several recordings against each other: other joints, other bones, other rest poses."""
+"""Comparison of the skeletons of several recordings: joints, bones, rest poses."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from a2g_jax.inspection.finding import Finding, Place
 
 #: Degrees between directions of a bone at rest: exporters round, and calibration moves a bone by a few degrees.
 REST_ANGLE = 15.0
-#: Ratio of the size of a skeleton to the usual one beyond which another unit is likelier than another person.
+#: Ratio of the sizes of a skeleton and the median one from which another unit is likelier than another person.
 OTHER_UNIT = 1.6
 #: Share by which the bones of one person may differ between takes.
 SAME_BONES = 0.02
@@ -22,11 +22,11 @@ _SHORT = 0.01
 def check_skeletons(
     skeletons: Sequence[Skeleton], names: Sequence[str], speakers: Sequence[str] | None = None
 ) -> list[Finding]:
-    """What differs among the skeletons of recordings that are meant to be trained on together.
+    """Findings on differences between the skeletons of recordings for one training.
 
     Args:
-        names: of the recordings.
-        speakers: who moves in each, empty where unknown; bones may differ between people.
+        names: names of the recordings.
+        speakers: speaker of each, empty where unknown; bones may differ between people.
     """
     if len(skeletons) < 2:
         return []
@@ -45,7 +45,7 @@ def check_skeletons(
         if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
             alike.remove(at)
             message = f"is {ratio:.3g} times as large as the usual skeleton here."
-            fix = "Is it in another unit? Say which when you read it (read_bvh's scale)."
+            fix = "If it is in another unit, name it when reading (scale of read_bvh)."
             findings.append(Finding("warning", "unit", message, fix, Place(recording=names[at]), ratio))
     return findings + _offsets(
         [skeletons[at] for at in alike],
@@ -100,7 +100,7 @@ def _bones(lengths, names: Sequence[str], speakers: Sequence[str], joints: Seque
             worst = int(np.argmax(np.where(long, np.abs(lengths[row] / np.maximum(usual, 1e-9) - 1), 0.0)))
             share = float(lengths[row, worst] / usual[worst])
             message = f"bones are not those of {speaker}'s other recordings: {joints[worst]} {share:.2f} times as long."
-            fix = "Was the person calibrated anew, or is the speaker another?"
+            fix = "Check the calibration and the name of the speaker."
             findings.append(Finding("warning", "bones", message, fix, Place(recording=names[row]), share))
     if spread > SAME_BONES and not findings and not any(speakers):
         message = f"bones differ by up to {100 * spread:.0f} % between the recordings, as between people."

@@ -1,4 +1,4 @@
-"""Inspecting a run made by ``a2g train``."""
+"""Inspection of a run made by ``a2g train``."""
 
 import json
 from dataclasses import asdict
@@ -14,7 +14,7 @@ from a2g_jax.inspection.tree import body_facts
 from a2g_jax.training.run import Run, load_run
 
 _METRICS = "metrics.jsonl"
-#: Times the best validation loss from which the last one has got worse and not merely fluctuates.
+#: Ratio of the last to the best validation loss from which the difference is no fluctuation.
 _WORSE = 1.25
 
 
@@ -22,7 +22,7 @@ def inspect_run(path: Path) -> Report:
     """Model, settings, corpus, size and progress of a run.
 
     Raises:
-        InputError: it is no run, or a damaged one.
+        InputError: not a run, or a damaged one.
     """
     run = load_run(path)
     log = _metrics(path / _METRICS)
@@ -30,29 +30,29 @@ def inspect_run(path: Path) -> Report:
 
 
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
-    """Training that has not ended, losses that are no numbers, validation that got worse."""
+    """Findings on unfinished training, losses that are not numbers, and rising validation loss."""
     findings = []
-    asked = run.config.train_config.steps
-    if run.steps < asked:
-        message = f"{run.steps} of {asked} steps are done."
+    wanted = run.config.train_config.steps
+    if run.steps < wanted:
+        message = f"{run.steps} of {wanted} steps are done."
         findings.append(
-            Finding("info", "unfinished", message, "'a2g train ... --resume' goes on.", value=run.steps / asked)
+            Finding("info", "unfinished", message, "Continue with 'a2g train ... --resume'.", value=run.steps / wanted)
         )
     losses = [line.get("loss") for line in log if "loss" in line]
     if None in losses:
-        message = f"{losses.count(None)} logged losses are no numbers."
+        message = f"{losses.count(None)} logged losses are not numbers."
         findings.append(Finding("warning", "nan", message, "Lower the learning rate, or inspect the corpus."))
     checked = [line["loss"] for line in log if line.get("split") == "validation" and line.get("loss") is not None]
     # Losses below zero, as of likelihoods, have no ratio.
     if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
         message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
-        fix = "It learns its corpus by heart: train on more recordings, or for fewer steps."
+        fix = "It overfits: train on more recordings, or for fewer steps."
         findings.append(Finding("info", "overfitting", message, fix, value=checked[-1] / min(checked)))
     return findings
 
 
 def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
-    """What a run is."""
+    """The facts of a run."""
     config = run.config
     sizes = {name: int(np.size(value)) for name, value in flatten_dict(run.params, sep="/").items()}
     parts: dict[str, int] = {}
@@ -94,7 +94,7 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _metrics(path: Path) -> list[dict[str, Any]]:
-    """Lines of the log; what a kill cut short is left out."""
+    """Lines of the log, without a last line that was cut short."""
     lines: list[dict[str, Any]] = []
     if not path.is_file():
         return lines

@@ -1,4 +1,4 @@
-"""What moves in a motion: a skeleton, as a drawn tree, or points and bones."""
+"""The body of a motion: a skeleton, as a drawn tree, or points and bones."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from a2g_jax.geometry.skeleton import Skeleton
 
 
 def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]:
-    """Joints with parents, bone lengths in centimetres and the parts of a body that were found."""
+    """Joints with parents, bone lengths in centimetres and the parts of a body."""
     part_of: dict[int, str] = {}
     facts: dict[str, Any] = {"count": skeleton.joints}
     if rig is not None:
@@ -31,7 +31,7 @@ def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]
 
 
 def body_facts(body: Skeleton | PoseLayout, rig: Rig | None = None) -> dict[str, Any]:
-    """The section of a report on what moves: ``skeleton``, or ``points`` where poses are keypoints or directions."""
+    """The section of a report on the body: ``skeleton``, or ``points`` where poses are keypoints or directions."""
     if isinstance(body, Skeleton):
         return {"skeleton": skeleton_facts(body, rig)}
     points: dict[str, Any] = {
@@ -44,7 +44,7 @@ def body_facts(body: Skeleton | PoseLayout, rig: Rig | None = None) -> dict[str,
 
 
 def draw_tree(facts: dict[str, Any]) -> list[str]:
-    """One line a joint: the branch, the name, the length of its bone, the part of the body."""
+    """One line per joint: branch, name, bone length, part of the body."""
     joints = facts["joints"]
     children: dict[int, list[int]] = {}
     for joint, entry in enumerate(joints):

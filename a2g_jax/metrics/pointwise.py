@@ -15,7 +15,7 @@ from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 Positions = Float[Array | np.ndarray, "*batch T J D"]
 Rotations = Float[Array | np.ndarray, "*batch T J 3 3"]
 
-#: From wrist to wrist of Audio2Gestures' skeleton in T-pose, metres (extended paper, Eq. 23).
+#: Distance of the wrists of Audio2Gestures' skeleton in T-pose, metres (extended paper, Eq. 23).
 REFERENCE_WRIST_TO_WRIST = 1.2064
 
 
@@ -27,10 +27,11 @@ def position_l1(predicted: Positions, target: Positions) -> Float[Array, "*batch
 def position_l1_star(
     predicted: Positions, target: Positions, wrist_to_wrist: float, reference: float = REFERENCE_WRIST_TO_WRIST
 ) -> Float[Array, "*batch"]:
-    """:func:`position_l1` as it would be on a skeleton of the reference size (Eq. 23).
+    """:func:`position_l1` scaled to a skeleton of the reference size (Eq. 23).
 
     Args:
-        wrist_to_wrist: of the skeleton in T-pose, in the unit of ``reference``.
+        wrist_to_wrist: distance of the wrists in T-pose, in the unit of ``reference``.
+        reference: the same of the reference skeleton.
     """
     return position_l1(predicted, target) * (reference / wrist_to_wrist)
 
@@ -51,12 +52,12 @@ def wrist_to_wrist(skeleton: Skeleton) -> float | None:
 
 
 def position_l2(predicted: Positions, target: Positions) -> Float[Array, "*batch"]:
-    """Mean over frames and joints of a joint's distance from where it should be (EmotionGesture's L2)."""
+    """Mean over frames and joints of a joint's distance from its target (EmotionGesture's L2)."""
     return jnp.mean(jnp.linalg.norm(predicted - target, axis=-1), axis=(-2, -1))
 
 
 def speed_l1(predicted: Positions, target: Positions, fps: float = 1.0) -> Float[Array, "*batch"]:
-    """:func:`position_l1` of velocities ``(p[t+1] - p[t]) fps``; with ``fps`` 1 the paper's units a frame."""
+    """:func:`position_l1` of velocities ``(p[t+1] - p[t]) fps``; with ``fps`` 1 in the paper's units per frame."""
     return fps * position_l1(jnp.diff(predicted, axis=-3), jnp.diff(target, axis=-3))
 
 
@@ -69,7 +70,7 @@ def pck(predicted: Positions, target: Positions, threshold: float | Float[Array,
     """Percentage of correct keypoints, as a share: joints nearer than ``threshold`` to their targets (Eq. 24).
 
     Args:
-        threshold: in the unit of the positions. Audio2Gestures has 0.2, the flow paper's code 0.1 of TED's units.
+        threshold: in the unit of the positions: 0.2 in Audio2Gestures, 0.1 of TED's units in the flow paper's code.
     """
     distance = jnp.linalg.norm(predicted - target, axis=-1)
     share = jnp.mean((distance < threshold).astype(predicted.dtype), axis=(-2, -1))

@@ -21,6 +21,7 @@ from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, 
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.rotation import axis_angle_from_matrix
+from a2g_jax.metrics.pointwise import wrist_to_wrist
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
@@ -30,7 +31,7 @@ from a2g_jax.training.run import RunConfig
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    """Ten generated recordings of twelve seconds, as 'a2g prepare talker' tells of them."""
+    """Ten generated recordings of twelve seconds, as of 'a2g prepare talker'."""
     roles = [{**role, "seconds": 12.0} for role in cast(10.0, 5, (), ("neutral", "anger"))[:10]]
     rows = (prepare_recording(talk(**role), Features()) for role in roles)
     recipe = {"reader": "talker", "roles": roles, "fingers": False, "jitter": 0.0, "view": "body"}
@@ -39,7 +40,7 @@ def corpus(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def network(corpus, tmp_path_factory):
-    """A feature network that has seen the corpus for a moment."""
+    """A feature network trained on the corpus for a moment."""
     small = dataclasses.replace(
         find_model("motion_autoencoder").presets["tiny"],
         encoder_channels=(16, 16, 16, 24, 8),
@@ -241,7 +242,7 @@ def test_speakers_are_grouped_by_their_motion_but_not_by_the_mean_pose(result):
 
 def test_the_reach_of_the_skeleton_scales_the_starred_error(corpus, result):
     row = next(row for row in result["rows"] if row["name"] == "mean pose")["scores"]
-    reach = Body(corpus.body).reach()
+    reach = wrist_to_wrist(corpus.body)
     assert 1.0 < reach < 1.6
     expected = row["position_l1"]["mean"] * 1.2064 / reach
     assert row["position_l1_star"]["mean"] == pytest.approx(expected, rel=1e-6)
@@ -252,9 +253,9 @@ def test_semantic_labels_are_weights_of_frames(corpus):
     """SRGR counts the labelled frames alone."""
     segment = corpus.segments("test")[0]
     labels = [{"label": "deictic", "start": 1.0, "end": 2.0, "score": 0.5}]
-    told = dataclasses.replace(corpus)
-    object.__setattr__(told, "annotations", lambda recording: {"semantic": labels})
-    values = relevance(told, segment)
+    labelled = dataclasses.replace(corpus)
+    object.__setattr__(labelled, "annotations", lambda recording: {"semantic": labels})
+    values = relevance(labelled, segment)
     assert values.shape == (segment.frames,)
     assert set(np.nonzero(values)[0]) == set(range(30, 60))
     assert relevance(corpus, segment) is None

@@ -81,18 +81,18 @@ def test_skeletons():
     taller = usual.scaled(1.1)
     assert codes(check_skeletons([*many, taller], names, speakers)) == set()
     assert codes(check_skeletons([*many, taller], names, ["ada"] * 5)) == {"bones"}
-    (told,) = check_skeletons([*many, taller], names)
-    assert (told.severity, told.code) == ("info", "bones")
+    (found,) = check_skeletons([*many, taller], names)
+    assert (found.severity, found.code) == ("info", "bones")
     lowered = offsets.copy()
     for joint in ("L_Elbow", "L_Wrist"):
         x, y, z = lowered[usual.index(joint)]
         lowered[usual.index(joint)] = (x * 0.7 + y * 0.7, -x * 0.7 + y * 0.7, z)
-    (told,) = check_skeletons([*many, replace(usual, offsets=lowered)], names, speakers)
-    assert (told.code, told.place.recording) == ("rest-pose", "take4")
+    (found,) = check_skeletons([*many, replace(usual, offsets=lowered)], names, speakers)
+    assert (found.code, found.place.recording) == ("rest-pose", "take4")
     renamed = replace(usual, names=(*usual.names[:-1], "R_Hand"))
-    (told,) = check_skeletons([renamed, *many], names)
-    assert (told.code, told.place.recording) == ("skeleton", "take0")
-    assert "lacks R_Wrist; has R_Hand" in told.message
+    (found,) = check_skeletons([renamed, *many], names)
+    assert (found.code, found.place.recording) == ("skeleton", "take0")
+    assert "lacks R_Wrist; has R_Hand" in found.message
 
 
 def test_rest_pose_in_a_folder(folder, tmp_path):
@@ -201,7 +201,7 @@ def test_late_motion_in_a_corpus(tmp_path):
     (found,) = (x for x in report.findings if x.severity == "warning")
     assert (found.code, found.place.recording) == ("offset", "long")
     assert found.value == pytest.approx(0.7, abs=0.1)
-    assert report.facts["offset"]["told in"] == "1 of 1 recordings"
+    assert report.facts["offset"]["measured in"] == "1 of 1 recordings"
 
 
 def test_run(tmp_path):

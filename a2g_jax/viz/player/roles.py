@@ -88,8 +88,8 @@ def ancestors(parents: tuple[int, ...], joint: int) -> list[int]:
 def rest_positions(skeleton: Skeleton) -> Float[np.ndarray, "J 3"]:
     """Joint positions of the rest pose with the root at the origin, metres."""
     offsets = np.asarray(skeleton.offsets, np.float64)
-    places = np.zeros_like(offsets)
+    positions = np.zeros_like(offsets)
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            places[joint] = places[parent] + offsets[joint]
-    return places
+            positions[joint] = positions[parent] + offsets[joint]
+    return positions
