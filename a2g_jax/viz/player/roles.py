@@ -40,7 +40,7 @@ class Roles:
 def find_roles(skeleton: Skeleton) -> Roles | None:
     """The roles of a skeleton as :func:`~a2g_jax.geometry.retarget.find_rig` finds them; None without two arms."""
     try:
-        # Roles do not depend on the reference pose, and the zero pose is always there.
+        # Only the sides of nameless limbs depend on the reference pose; the zero pose is always there.
         rig = find_rig(skeleton, rest="zero")
     except InputError:
         return None
