@@ -22,7 +22,7 @@ from a2g_jax.data.featurise import prepare_recording
 from a2g_jax.data.settings import Features
 from a2g_jax.evaluation.baselines import with_noise
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
 from a2g_jax.geometry.mirror import mirror
 from a2g_jax.geometry.motion import Motion
@@ -110,8 +110,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
     network = None
     if options.features is not None:
         network = FeatureNetwork(load_run(options.features), sha256_file(options.features / WEIGHTS_FILE))
-    scorer = Scorer(Body(rows[0].body), FPS, network)
-    targets = [Target(row.pose, scorer.body.places(row.pose), mel_onsets(row.audio, FPS)) for row in rows]
+    scorer = Scorer(PoseSpace(rows[0].body), FPS, network)
+    targets = [Target(row.pose, scorer.space.positions(row.pose), mel_onsets(row.audio, FPS)) for row in rows]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
 
     def score(spoil: Callable[[Pose, np.random.Generator], Pose]) -> dict[str, float]:

@@ -8,7 +8,7 @@ import pytest
 
 from a2g_jax.cli.inspect import add_arguments, run
 from a2g_jax.errors import InputError
-from a2g_jax.inspection.report import FORMAT
+from a2g_jax.inspection.report import FORMAT, VERSION
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.npz import write_motion_npz
@@ -57,10 +57,10 @@ def test_text(files, capsys):
 def test_json_is_one_document_and_says_the_same(files, capsys):
     assert inspect(files / "a.bvh", "--audio", files / "a.flac", "--json") == 0
     document = json.loads(capsys.readouterr().out)
-    assert (document["format"], document["version"], document["kind"]) == (FORMAT, 1, "pair")
+    assert (document["format"], document["version"], document["kind"]) == (FORMAT, VERSION, "pair")
     assert set(document) == {"format", "version", "path", "kind", "facts", "findings"}
     (found,) = [finding for finding in document["findings"] if finding["severity"] == "warning"]
-    assert set(found) == {"severity", "code", "message", "mend", "place", "value"}
+    assert set(found) == {"severity", "code", "message", "fix", "place", "value"}
     assert found["code"] == "length"
     assert document["facts"]["skeleton"]["joints"][1] == {
         "name": "L_Hip", "parent": 0, "bone_cm": pytest.approx(11.2, abs=0.1), "part": "L_Hip", "end": False,
@@ -90,7 +90,7 @@ def test_words_after_the_end(files, capsys):
 def test_errors_name_what_is_wrong(files, tmp_path):
     for arguments, message in (
         ([tmp_path / "no.bvh"], "no such file"),
-        ([__file__], "nothing that can be inspected"),
+        ([__file__], "cannot be inspected"),
         ([files / "other.npz", "--audio", files / "a.wav"], "neither a motion nor a transcript"),
         ([files / "a.bvh", "--audio", files / "a.bvh"], "is no audio"),
         ([tmp_path, "--audio", files / "a.wav"], "is a folder"),

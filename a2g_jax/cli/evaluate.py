@@ -38,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also test whether each run depends on the audio: late audio, other audio, silence, loudness",
     )
+    parser.add_argument(
+        "--metric", action="append", metavar="MODULE:NAME", help="a metric of another package; may be repeated"
+    )
     parser.add_argument("--split", default="test", help="of the corpus (default: test)")
     parser.add_argument("--samples", type=count, default=20, help="motions of each run for each clip (default: 20)")
     parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
@@ -74,6 +77,8 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
     from a2g_jax.evaluation.emotion_judge import load_emotion_judge
     from a2g_jax.evaluation.evaluate import evaluate
     from a2g_jax.evaluation.feature_network import load_feature_network
+    from a2g_jax.metrics.catalogue import METRICS
+    from a2g_jax.metrics.registry import find_metrics
     from a2g_jax.progress import progress_bar
     from a2g_jax.training.run import open_run
 
@@ -97,6 +102,7 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
             network=network,
             judge=judge,
             audit=options.audit,
+            extra_metrics=find_metrics(options.metric or (), tuple(METRICS)),
             report=report,
         )
 

@@ -75,13 +75,13 @@ def _score(options: argparse.Namespace) -> "Report":
     existing_file(options.score)
     existing_file(options.audio)
 
-    from a2g_jax.inspection.likelihood import score_file, score_report
+    from a2g_jax.inspection.likelihood import file_likelihood, likelihood_report
 
     motion = Path(options.score)
-    score = score_file(Path(options.path), motion, Path(options.audio))
+    likelihood = file_likelihood(Path(options.path), motion, Path(options.audio))
     if picture is not None:
         # Only here, since Matplotlib is optional.
         from a2g_jax.inspection.likelihood_plot import save_likelihood
 
-        save_likelihood(picture, score.seconds, score.log_likelihood, score.moments)
-    return score_report(score, motion, curve=options.json)
+        save_likelihood(picture, likelihood.seconds, likelihood.log_likelihood, likelihood.moments)
+    return likelihood_report(likelihood, motion, curve=options.json)

@@ -1,6 +1,6 @@
-"""What is scored beside a model: the truth, other right motions, and motions that are nobody's answer to the audio.
+"""Baselines: other right motions for the audio, noise, and motions that do not depend on the audio.
 
-Every candidate is poses of one test stretch, as the corpus writes them down, as many frames as the stretch has.
+Each is poses for one test stretch, in the representation of the corpus and of the length of the stretch.
 """
 
 from typing import Any
@@ -13,34 +13,29 @@ from jaxtyping import Float, Int
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
-from a2g_jax.geometry.rotation import matrix_from_6d, matrix_from_axis_angle
+from a2g_jax.geometry.rotation import matrix_from_axis_angle
 from a2g_jax.talker.recordings import resample_motion, talk
 
 Pose = Float[np.ndarray, "T R D"]
 
-#: Seconds of audio that are looked up at once in the training split.
+#: Length of the audio windows of :func:`nearest_neighbour`, seconds.
 NEIGHBOUR_SECONDS = 4.0
-#: Stretches compared at once: bounds memory at about 50 MB.
+#: Windows compared at once: bounds memory at about 50 MB.
 _CHUNK = 1500
 
 
 def mean_pose(corpus: Corpus, segment: Segment) -> Pose:
-    """The training split's mean pose, standing still."""
-    return np.tile(_mean(corpus)[None], (segment.frames, 1, 1)).astype(np.float32)
-
-
-def _mean(corpus: Corpus) -> Float[np.ndarray, "R D"]:
-    mean = np.asarray(corpus.statistics["pose"].mean)
-    if corpus.representation == "directions":
-        return mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
-    return mean
+    """The mean pose of the training split in every frame."""
+    mean = jnp.asarray(corpus.statistics["pose"].mean)
+    return np.tile(np.asarray(corpus.space.valid(mean))[None], (segment.frames, 1, 1)).astype(np.float32)
 
 
 def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:
-    """The motion of the next test stretch, begun anew where it is shorter; of a single one, its own second half first.
+    """The motion of the next test stretch, repeated where it is shorter; of a single one, its second half first.
 
-    Someone's real motion, but not to this audio.
+    Recorded motion, but of other audio.
     """
     segment = segments[number]
     if len(segments) == 1:
@@ -51,24 +46,25 @@ def other_clip(corpus: Corpus, segments: list[Segment], number: int) -> Pose:
     return np.asarray(corpus.pose[rows])
 
 
-def with_noise(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
-    """The truth with every joint turned, anew in each frame, about a random axis (Audio2Gestures, Table 4).
+def with_noise(space: PoseSpace, pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
+    """The truth with every joint turned, independently in each frame, about a random axis (Audio2Gestures, Table 4).
 
     Args:
+        space: of the pose; it has rotations.
         degrees: standard deviation of each component of the turn.
     """
     turns = matrix_from_axis_angle(jnp.asarray(rng.normal(0.0, np.deg2rad(degrees), (*pose.shape[:2], 3)), jnp.float32))
-    rotations = np.asarray(matrix_from_6d(np.asarray(pose, np.float32))) @ np.asarray(turns)
-    return np.swapaxes(rotations[..., :2], -1, -2).reshape(*pose.shape)
+    rotations = rotations_from_rows(np.asarray(pose, np.float32), space.kind)
+    return np.asarray(jax.jit(space.from_rotations)(rotations @ np.asarray(turns)))
 
 
 def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
-    """The training motion whose audio is most like this one's, four seconds at a time.
+    """The training motion whose audio is most similar, in windows of four seconds.
 
-    Distance is that of normalised log-mel rows; training audio is tried at every half second.
+    Euclidean distance of normalised log-mel rows; training windows start every half second.
 
     Raises:
-        InputError: no training stretch is that long.
+        InputError: no training stretch is as long as a window.
     """
     window = min(segment.frames, round(NEIGHBOUR_SECONDS * corpus.fps))
     step = max(1, round(0.5 * corpus.fps))
@@ -77,27 +73,29 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
             row
             for one in corpus.segments("train")
             for row in range(one.start, one.stop - window + 1, step)
-            # Where the training split itself is scored, nothing is its own neighbour.
+            # A stretch of the training split is not its own neighbour.
             if row >= segment.stop or row + window <= segment.start
         ],
         np.int64,
     )
     if len(starts) == 0:
-        raise InputError(f"{corpus.path}: has no other training stretch of {window} frames to look neighbours up in.")
-    # The last stretch ends with the clip, and overlaps the one before it.
+        raise InputError(
+            f"{corpus.path}: has no other training stretch of {window} frames for neighbours; prepare more."
+        )
+    # The last window ends with the clip and overlaps the one before.
     firsts = [*range(0, segment.frames - window + 1, window)]
     if firsts[-1] + window < segment.frames:
         firsts.append(segment.frames - window)
     wanted = _windows(corpus, segment.start + np.array(firsts), window)
     best, least = np.zeros(len(firsts), np.int64), np.full(len(firsts), np.inf)
     for chunk in range(0, len(starts), _CHUNK):
-        some = starts[chunk : chunk + _CHUNK]
-        there = _windows(corpus, some, window)
-        # |a - b|^2 without |b|^2, which is the same for all.
-        distance = np.sum(np.square(there), axis=1)[:, None] - 2.0 * there @ wanted.T
+        chunk_starts = starts[chunk : chunk + _CHUNK]
+        candidates = _windows(corpus, chunk_starts, window)
+        # |a - b|^2 without |b|^2, which is constant.
+        distance = np.sum(np.square(candidates), axis=1)[:, None] - 2.0 * candidates @ wanted.T
         nearest = np.argmin(distance, axis=0)
         values = distance[nearest, np.arange(len(firsts))]
-        best = np.where(values < least, some[nearest], best)
+        best = np.where(values < least, chunk_starts[nearest], best)
         least = np.minimum(values, least)
     pose = np.empty((segment.frames, *corpus.pose.shape[1:]), np.float32)
     for first, start in zip(firsts, best, strict=True):
@@ -106,16 +104,16 @@ def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:
 
 
 def _windows(corpus: Corpus, starts: Int[np.ndarray, " n"], frames: int) -> Float[np.ndarray, "n values"]:
-    """Normalised audio rows from each start on, side by side."""
+    """Normalised audio rows of the windows, flattened."""
     rows = np.asarray(corpus.audio)[starts[:, None] + np.arange(frames)[None]]
     return np.asarray(corpus.statistics["audio"].normalise(rows), np.float32).reshape(len(starts), -1)
 
 
 def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> list[Pose] | None:
-    """Other motions that are right for the same audio, drawn from the generator itself; None for real recordings.
+    """Other right motions for the same audio, drawn from the talker; None for real recordings.
 
     Raises:
-        InputError: the corpus was generated by another version.
+        InputError: the corpus was generated by another version of the talker.
     """
     role = _role(corpus, segment)
     if role is None:
@@ -128,13 +126,13 @@ def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> 
     poses = []
     for number in range(samples):
         motion, _ = resample_motion(recording, jax.random.fold_in(key, number))
-        pose, _ = represent(motion, corpus.representation, entry.name)
+        pose, _ = represent(motion, corpus.space.kind, entry.name)
         poses.append(pose[first : first + segment.frames])
     return poses
 
 
 def _role(corpus: Corpus, segment: Segment) -> dict[str, Any] | None:
-    """How a generated recording was made, if it was, and shown as it is."""
+    """Arguments of a generated recording; None for real ones and for altered views."""
     recipe = corpus.recipe
     if recipe.get("reader") != "talker" or recipe.get("view", "body") != "body" or recipe.get("jitter", 0.0) != 0.0:
         return None

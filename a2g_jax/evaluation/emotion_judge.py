@@ -1,4 +1,4 @@
-"""What is known about the recordings that are scored: emotions for a classifier, and where gestures carry meaning."""
+"""Labels in evaluation: a classifier of emotions, and semantic relevance."""
 
 import os
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.places import Pose
+from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.io.files import sha256_file
 from a2g_jax.training.perceptual import check_poses
 from a2g_jax.training.run import Run, load_run
@@ -38,22 +38,22 @@ class EmotionJudge:
         return jax.jit(lambda params, pose: classifier.logits(params, Batch(jnp.zeros((*pose.shape[:2], bands)), pose)))
 
     def accuracy(self, pose: Pose, emotion: str) -> float:
-        """Share of the motion's clips that are taken for the emotion (EmotionGesture's EA); NaN for too short ones and
-        for emotions that the classifier does not know."""
+        """Share of the motion's clips that are classified as the emotion (EmotionGesture's EA); NaN for motion shorter
+        than a clip and for emotions that the classifier lacks."""
         frames: int = self.run.config.model_config.clip_frames
-        known, count = self.run.config.corpus["emotions"], len(pose) // frames
-        if count == 0 or emotion not in known:
+        names, count = self.run.config.corpus["emotions"], len(pose) // frames
+        if count == 0 or emotion not in names:
             return float("nan")
         clips = np.asarray(pose[: count * frames], np.float32).reshape(count, frames, *pose.shape[1:])
         logits = np.asarray(self._logits(self.run.params, clips))
-        return float(np.mean(np.argmax(logits, axis=-1) == known.index(emotion)))
+        return float(np.mean(np.argmax(logits, axis=-1) == names.index(emotion)))
 
 
 def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> EmotionJudge:
-    """A run of ``emotion_classifier`` that looks at such motion as a corpus has.
+    """Load a run of ``emotion_classifier`` for the motion of a corpus.
 
     Raises:
-        InputError: another model, one that listens to audio, or one for other poses, rates or emotions.
+        InputError: another model, one with audio as input, or one for other poses, frame rates or emotions.
     """
     run = load_run(folder)
     config = run.config
@@ -66,13 +66,13 @@ def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> Emotio
     check_poses(str(folder), config, corpus)
     if not set(corpus.emotions) & set(config.corpus["emotions"]):
         raise InputError(
-            f"{folder}: knows the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."
+            f"{folder}: has the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."
         )
     return EmotionJudge(run, sha256_file(Path(folder) / WEIGHTS_FILE))
 
 
 def relevance(corpus: Corpus, segment: Segment) -> Float[np.ndarray, " T"] | None:
-    """How much the gesture of each frame means, from the recording's semantic labels; None where it has none."""
+    """Semantic relevance of each frame, from the recording's labels; None without labels."""
     entry = corpus.recordings[segment.recording]
     labels = corpus.annotations(segment.recording).get("semantic")
     if not labels:

@@ -1,8 +1,8 @@
-"""A table of candidates on a split: models, the truth, and what is neither."""
+"""Scores of models and baselines on a split."""
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,27 +13,26 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import baselines as candidates
-from a2g_jax.evaluation.audit import Heard, listening_audit
+from a2g_jax.evaluation.audit import AudioCondition, listening_audit
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.places import Body, Pose
-from a2g_jax.evaluation.report import BASELINES
-from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
+from a2g_jax.evaluation.arrays import Pose
+from a2g_jax.evaluation.report import BASELINES, describe_metrics
+from a2g_jax.evaluation.scores import Metric, Scorer, Target
+from a2g_jax.evaluation.summary import summarise
+from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
-from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.distribution import frechet_distance, split_floor
-from a2g_jax.metrics.intervals import bootstrap_mean
-from a2g_jax.metrics.labels import calinski_harabasz, silhouette
+from a2g_jax.metrics.distribution import split_floor
 from a2g_jax.training.run import Run
 
-#: Of a stretch no more is scored (Audio2Gestures, Sec. 5.3.1).
+#: Longest stretch that is scored, frames (Audio2Gestures, Sec. 5.3.1).
 MOST_FRAMES = 5000
-#: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer stretches than this are cut into pieces
-#: of that length, so that there is anything to draw intervals from.
+#: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer than three stretches are cut into
+#: pieces of that length, for intervals over clips.
 _LEAST_FRAMES, _FEW = 100, 3
-#: How much is generated again and again to see whether a model listens.
+#: Clips of an audit, and their length in seconds.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
 
 
@@ -43,37 +42,31 @@ class Row:
 
     name: str
     samples: int
-    """Motions for each clip."""
+    """Number of motions for each clip."""
     scores: dict[str, dict[str, Any]]
-    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, averaged over clips)."""
+    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips)."""
 
 
 def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
-    """Refuse runs whose motion cannot be compared on a corpus.
+    """Refuse runs that do not fit a corpus.
 
     Raises:
-        InputError: another skeleton, frame rate or audio feature.
+        InputError: another representation, skeleton, frame rate or audio feature.
     """
     for name, run in runs.items():
         config = run.config
-        if config.representation != corpus.representation:
+        if config.space.kind != corpus.space.kind:
             raise InputError(
-                f"{name}: makes {config.representation}, but {corpus.path} holds {corpus.representation}; prepare that"
-                f" with --pose {config.representation}."
+                f"{name}: generates {config.space.kind}, but {corpus.path} holds {corpus.space.kind};"
+                f" prepare that with --pose {config.space.kind}."
             )
-        if not _same_body(config.body, corpus.body):
-            raise InputError(f"{name}: moves another skeleton than {corpus.path} has; train one on such a corpus.")
+        if not config.space.same_as(corpus.space):
+            raise InputError(f"{name}: has another skeleton than {corpus.path}; train on such a corpus.")
         if config.fps != corpus.fps or config.mel != corpus.mel:
             raise InputError(
-                f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, otherwise made than the"
+                f"{name}: takes {config.mel.width} audio values at {config.fps:g} fps, with other settings than the"
                 f" {corpus.mel.width} at {corpus.fps:g} fps of {corpus.path}; prepare that with its features."
             )
-
-
-def _same_body(first: Skeleton | PoseLayout, second: Skeleton | PoseLayout) -> bool:
-    if isinstance(first, Skeleton) and isinstance(second, Skeleton):
-        return first.same_tree(second)
-    return isinstance(first, PoseLayout) and isinstance(second, PoseLayout) and first.names == second.names
 
 
 def evaluate(
@@ -87,17 +80,22 @@ def evaluate(
     judge: EmotionJudge | None = None,
     audit: bool = False,
     baselines: bool = True,
+    extra_metrics: Sequence[Metric] = (),
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Score runs and baselines; JSON-able.
 
     Args:
-        samples: motions that each run makes for each clip.
-        network: without one, FGD, LPIPS and what is told of groups are left out.
-        judge: without one, emotion accuracy is left out.
-        baselines: whether the rows beside the runs are scored too.
-        audit: whether each run's listening is looked into too: see :mod:`a2g_jax.evaluation.audit`.
-        report: called with how many (candidate, clip) pairs are done, of how many.
+        runs: runs by name.
+        split: a split of the corpus.
+        samples: motions of each run for each clip.
+        seed: seed of samples, noise and bootstrap.
+        network: for FGD, LPIPS and the grouping of speakers; left out without one.
+        judge: for emotion accuracy; left out without one.
+        audit: whether to audit each run (:mod:`a2g_jax.evaluation.audit`).
+        baselines: whether to score the baselines too.
+        extra_metrics: metrics of other packages (:func:`~a2g_jax.metrics.registry.find_metrics`).
+        report: called with the number of (candidate, clip) pairs done, and their total.
 
     Raises:
         InputError: runs that do not fit the corpus, or a split without a stretch long enough.
@@ -111,7 +109,7 @@ def evaluate(
         segments = [piece for segment in segments for piece in _pieces(segment, least)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
-    scorer = Scorer(Body(corpus.body, corpus.representation), corpus.fps, network, judge)
+    scorer = Scorer(corpus.space, corpus.fps, network, judge, tuple(extra_metrics))
     targets = [_target(corpus, scorer, segment) for segment in segments]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
     speakers = [corpus.recordings[segment.recording].speaker for segment in segments]
@@ -120,7 +118,8 @@ def evaluate(
         if not baselines and name in BASELINES and name not in runs:
             continue
         per_clip: list[list[dict[str, float]]] = []
-        spread, features, count = [], [], 0
+        per_group: list[dict[str, float]] = []
+        features, count = [], 0
         for number, target in enumerate(targets):
             poses = draw(number)
             done += 1
@@ -128,11 +127,12 @@ def evaluate(
             if poses is None:
                 continue
             count = len(poses)
-            per_clip.append([scorer.sample(pose, target) for pose in poses])
-            spread.append(scorer.multimodality(poses))
+            motions = [scorer.context(pose, target) for pose in poses]
+            per_clip.append([scorer.motion_scores(motion) for motion in motions])
+            per_group.append(scorer.clip_scores(motions))
             features.append([scorer.features(pose) for pose in poses])
         if per_clip:
-            rows.append(Row(name, count, _summary(per_clip, spread, features, reference, speakers, seed)))
+            rows.append(Row(name, count, summarise(scorer, per_clip, per_group, features, reference, speakers, seed)))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -146,17 +146,19 @@ def evaluate(
         "skeleton": _fingerprint(corpus),
         "feature_network": None if network is None else network.fingerprint,
         "emotion_classifier": None if judge is None else judge.fingerprint,
-        "unit": scorer.body.unit,
+        "unit": scorer.space.unit,
         "feature_vectors": len(reference),
         "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
         "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
     }
+    if extra_metrics:
+        about["extra_metrics"] = describe_metrics(extra_metrics)
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}
     return {"about": about, "rows": [asdict(row) for row in rows], "audits": audits}
 
 
 def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], seed: int) -> dict[str, Any]:
-    """On the first half minute of a few clips."""
+    """The audit on the first half minute of a few clips."""
     generator, chosen = Generator(run), segments[:_AUDIT_CLIPS]
     frames = [min(segment.frames, round(_AUDIT_SECONDS * corpus.fps)) for segment in chosen]
     clips = [
@@ -165,15 +167,15 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
     ]
     speakers = [corpus.recordings[segment.recording].speaker for segment in chosen]
 
-    def listen(heard: Heard, number: int) -> np.ndarray:
-        rows = next(generator.rows(np.asarray(heard.features, np.float32), 1, (seed + number) % 2**31))
-        return scorer.body.wrists(scorer.body.places(rows))
+    def generate(audio: AudioCondition, number: int) -> np.ndarray:
+        rows = next(generator.rows(np.asarray(audio.features, np.float32), 1, (seed + number) % 2**31))
+        return scorer.space.wrists(scorer.space.positions(rows))
 
-    return listening_audit(listen, clips, speakers, corpus.fps)
+    return listening_audit(generate, clips, speakers, corpus.fps)
 
 
 def _pieces(segment: Segment, frames: int) -> list[Segment]:
-    """A stretch cut into clips of so many frames, the last one longer by the remainder."""
+    """A stretch cut into clips of a number of frames, the last one longer by the remainder."""
     starts = range(segment.start, segment.stop - 2 * frames + 1, frames)
     bounds = [*starts, segment.start + len(starts) * frames, segment.stop]
     return [Segment(segment.recording, start, stop) for start, stop in zip(bounds, bounds[1:], strict=False)]
@@ -187,7 +189,7 @@ def _target(corpus: Corpus, scorer: Scorer, segment: Segment) -> Target:
     pose = np.asarray(corpus.pose[segment.start : segment.stop])
     onsets = mel_onsets(np.asarray(corpus.audio[segment.start : segment.stop]), corpus.fps)
     emotion = corpus.recordings[segment.recording].emotion
-    return Target(pose, scorer.body.places(pose), onsets, emotion, relevance(corpus, segment))
+    return Target(pose, scorer.space.positions(pose), onsets, emotion, relevance(corpus, segment))
 
 
 _Draw = Callable[[int], list[Pose] | None]
@@ -196,22 +198,26 @@ _Draw = Callable[[int], list[Pose] | None]
 def _candidates(
     runs: dict[str, Run], corpus: Corpus, segments: list[Segment], samples: int, seed: int
 ) -> Iterator[tuple[str, _Draw]]:
-    """Each candidate's name, and the function that gives its motions for a clip (None if there are none)."""
+    """Each candidate's name, and a function from a clip to its motions (None if there are none)."""
     for name, run in runs.items():
         generator = Generator(run)
 
         def model(number: int, generator: Generator = generator) -> list[Pose]:
             segment = segments[number]
             audio = np.asarray(corpus.audio[segment.start : segment.stop])
+            given = corpus_condition(generator.run, corpus, segment.start, segment.stop)
             # A seed of its own for every clip, so that clips are independent draws.
-            return list(generator.rows(audio, samples, (seed + 7919 * (number + 1)) % 2**31))
+            return list(generator.rows(audio, samples, (seed + 7919 * (number + 1)) % 2**31, **given))
 
         yield name, model
     truth = lambda number: np.asarray(corpus.pose[segments[number].start : segments[number].stop])  # noqa: E731
-    rotates = corpus.representation == "6d"
-    noise = lambda number, degrees: (  # noqa: E731
-        [candidates.with_noise(truth(number), degrees, np.random.default_rng([seed, number]))] if rotates else None
-    )
+
+    def noise(number: int, degrees: float) -> list[Pose] | None:
+        if not corpus.space.has_rotations:
+            return None
+        rng = np.random.default_rng([seed, number])
+        return [candidates.with_noise(corpus.space, truth(number), degrees, rng)]
+
     baselines: tuple[_Draw, ...] = (
         lambda number: [truth(number)],
         lambda number: candidates.right_motions(corpus, segments[number], samples, seed),
@@ -224,66 +230,10 @@ def _candidates(
     yield from zip(BASELINES, baselines, strict=True)
 
 
-def _summary(
-    per_clip: list[list[dict[str, float]]],
-    spread: list[float],
-    features: list[list[np.ndarray]],
-    reference: np.ndarray,
-    speakers: list[str],
-    seed: int,
-) -> dict[str, dict[str, Any]]:
-    """Means over samples, then over clips with intervals; and the best sample of each clip, averaged over clips."""
-    rng = np.random.default_rng(seed)
-    summary: dict[str, dict[str, Any]] = {}
-    for name in PER_SAMPLE:
-        values = np.array([[scores.get(name, np.nan) for scores in clip] for clip in per_clip])
-        if np.isnan(values).all():
-            continue
-        # A clip too short for a metric has no score in any sample.
-        values = values[~np.isnan(values).all(axis=1)]
-        interval = bootstrap_mean(np.nanmean(values, axis=1), rng)
-        best = {"lower": np.nanmin, "higher": np.nanmax}.get(METRICS[name].better)
-        summary[name] = {
-            "mean": interval.mean,
-            "low": interval.low,
-            "high": interval.high,
-            "best": None if best is None else float(np.nanmean(best(values, axis=1))),
-        }
-    if not np.isnan(spread).all():
-        interval = bootstrap_mean(np.array(spread), rng)
-        summary["multimodality"] = {**interval._asdict(), "best": None}
-    if len(reference) >= 2:
-        # One set of features for each sample number, over all clips, so that n is that of the truth.
-        sets = [np.concatenate([clip[sample] for clip in features]) for sample in range(len(features[0]))]
-        distances = [frechet_distance(vectors, reference).value for vectors in sets]
-        summary |= _groups(features, speakers)
-        summary["fgd"] = {"mean": float(np.mean(distances)), "low": None, "high": None, "best": float(min(distances))}
-    return summary
-
-
-def _groups(features: list[list[np.ndarray]], speakers: list[str]) -> dict[str, dict[str, Any]]:
-    """How well the speakers are grouped in the space of the features, for each sample number and on average."""
-    found: dict[str, list[float]] = {"chi": [], "silhouette": []}
-    numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
-    for sample in range(len(features[0])):
-        vectors = np.concatenate([clip[sample] for clip in features])
-        labels = np.concatenate(
-            [np.full(len(clip[sample]), numbers[name]) for clip, name in zip(features, speakers, strict=True)]
-        )
-        if not 2 <= len(np.unique(labels)) < len(labels):
-            return {}
-        found["chi"].append(calinski_harabasz(vectors, labels))
-        found["silhouette"].append(silhouette(vectors, labels))
-    return {
-        name: {"mean": float(np.mean(values)), "low": None, "high": None, "best": None}
-        for name, values in found.items()
-    }
-
-
 def _fingerprint(corpus: Corpus) -> str:
     body = corpus.body
     if isinstance(body, Skeleton):
         value = [list(body.names), list(body.parents), np.round(np.asarray(body.offsets), 4).tolist()]
     else:
-        value = [corpus.representation, list(body.names), [list(bone) for bone in body.bones]]
+        value = [corpus.space.kind, list(body.names), [list(bone) for bone in body.bones]]
     return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""The trained network whose features learned metrics compare."""
+"""The trained network whose features are compared by learned metrics."""
 
 import os
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.training.perceptual import load_feature_run
 from a2g_jax.training.run import Run
 
-#: Which residual block's features FID looks at: the fourth (Audio2Gestures, extended, Sec. 5.1).
+#: Residual block whose features FID compares: the fourth (Audio2Gestures, extended, Sec. 5.1).
 FID_BLOCK = 3
 
 
@@ -24,11 +24,11 @@ class FeatureNetwork:
 
     run: Run
     fingerprint: str
-    """SHA-256 of its weights: scores by networks of different fingerprints cannot be compared."""
+    """SHA-256 of its weights: scores of different networks cannot be compared."""
 
     @property
     def clip_frames(self) -> int:
-        """Frames of a clip, of which one feature vector is taken."""
+        """Frames of a clip, from which one feature vector is computed."""
         frames: int = self.run.config.model_config.clip_frames
         return frames
 
@@ -52,9 +52,9 @@ class FeatureNetwork:
 
 
 def load_feature_network(folder: str | os.PathLike[str], corpus: Corpus) -> FeatureNetwork:
-    """A run of ``motion_autoencoder`` that looks at such poses as a corpus has.
+    """Load a run of ``motion_autoencoder`` for the poses of a corpus.
 
     Raises:
-        InputError: not a run, one of another model, or one for other joints, poses or frame rate.
+        InputError: not a run, one of another model, or one for other joints, poses or frame rates.
     """
     return FeatureNetwork(*load_feature_run(folder, corpus))

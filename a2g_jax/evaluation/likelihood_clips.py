@@ -1,4 +1,4 @@
-"""Clips of a split as a model of densities is scored on them: as long as in training, with and without its noise."""
+"""Clips of a split on which likelihoods are evaluated: as long as in training, with and without its noise."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -10,32 +10,31 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.training.run import RunConfig
 
-#: Clips that are worked on at once.
+#: Clips of a batch.
 BATCH = 32
 
 
 class Clips(NamedTuple):
-    """A batch; all have one size, to compile once."""
+    """A batch; all batches have one size, to compile once."""
 
     audio: Float[np.ndarray, "B T bands"]
     """Normalised."""
     pose: Float[np.ndarray, "B T R D"]
-    """As they are scored."""
+    """Poses to evaluate, with noise if there is any."""
     clean: Float[np.ndarray, "B T R D"]
-    """As the corpus holds them."""
+    """Poses of the corpus."""
     kept: int
-    """How many of them count; the rest are the last one again."""
+    """Number of clips that count; the rest repeat the last one."""
 
 
 def scored_frames(config: RunConfig) -> int:
-    """Frames of a clip that have history and lookahead."""
-    model = config.model_config
-    frames: int = model.clip_frames - model.history_frames - model.lookahead_frames
-    return frames
+    """Number of frames of a clip that have history and lookahead."""
+    model = config.build()
+    return model.clip_frames - model.seed_frames - model.lookahead
 
 
 def clip_starts(config: RunConfig, corpus: Corpus, split: str) -> Int[np.ndarray, " clips"]:
-    """First rows of clips that overlap by what is only told, so that they score each frame of a stretch once.
+    """First rows of clips that overlap by history and lookahead, so that each frame of a stretch is evaluated once.
 
     The remainder of a stretch is left out.
 
@@ -57,11 +56,11 @@ def clip_starts(config: RunConfig, corpus: Corpus, split: str) -> Int[np.ndarray
 def clip_batches(
     config: RunConfig, corpus: Corpus, starts: Int[np.ndarray, " clips"], noise: float, seed: int
 ) -> Iterator[Clips]:
-    """The clips at those rows.
+    """Batches of the clips that begin at the rows.
 
     Args:
-        noise: standard deviation of what is added to poses, in z-scores.
-        seed: with the row of a clip it fixes the clip's noise, so that every model sees the same.
+        noise: standard deviation of the noise added to poses, in z-scores.
+        seed: determines, with the row of a clip, its noise: the same for every model.
     """
     frames = config.model_config.clip_frames
     std = np.asarray(config.statistics["pose"].std, np.float64)[None]

@@ -1,15 +1,16 @@
-"""The table of an evaluation as JSON, Markdown, LaTeX and a picture."""
+"""The report of an evaluation as JSON, Markdown, LaTeX and a picture."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.scores import AGAINST_TRUTH, METRICS
+from a2g_jax.evaluation.scores import METRICS, Metric
 from a2g_jax.io.files import atomic_path, make_folder, read_json
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
-#: What is scored beside the models, in the order of the table.
+#: Baselines, in the order of the table.
 BASELINES = (
     "truth",
     "another right motion",
@@ -44,17 +45,17 @@ def write_report(result: dict[str, Any], out: Path) -> list[Path]:
 
 
 def markdown(result: dict[str, Any]) -> str:
-    """The table with what it is of and how it is read."""
-    about, names = result["about"], _metrics(result)
+    """The tables with their conditions and notes on how to read them."""
+    about, metrics = result["about"], _metrics(result)
     lines = []
     for title, part in (
-        ("Against the recorded motion", [name for name in names if name in AGAINST_TRUTH]),
-        ("Distribution, variety, rhythm and smoothness", [name for name in names if name not in AGAINST_TRUTH]),
+        ("Against the recorded motion", [metric for metric in metrics if metric.against_target]),
+        ("Distribution, variety, rhythm and smoothness", [metric for metric in metrics if not metric.against_target]),
     ):
-        head = [f"{METRICS[name].title}{_unit(name, about)} {_ARROWS[METRICS[name].better]}" for name in part]
+        head = [f"{metric.title}{_unit(metric, about)} {_ARROWS[metric.better]}" for metric in part]
         lines += [f"**{title}**", "", "| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(part) + 2)]
         for row in result["rows"]:
-            cells = [_cell(row["scores"].get(name), name) for name in part]
+            cells = [_cell(row["scores"].get(metric.key), metric) for metric in part]
             lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
         lines.append("")
     audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
@@ -62,14 +63,14 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def latex(result: dict[str, Any]) -> str:
-    """A table for a paper (needs booktabs): means and, behind them in brackets, the best of the samples."""
-    names = _metrics(result)
-    head = " & ".join(["", *(f"{METRICS[name].title} {_LATEX_ARROWS[METRICS[name].better]}" for name in names)])
-    lines = [r"\begin{tabular}{l" + "r" * len(names) + "}", r"\toprule", head + r" \\", r"\midrule"]
+    """A table for a paper (needs booktabs): means, with the best of the samples in brackets."""
+    metrics = _metrics(result)
+    head = " & ".join(["", *(f"{metric.title} {_LATEX_ARROWS[metric.better]}" for metric in metrics)])
+    lines = [r"\begin{tabular}{l" + "r" * len(metrics) + "}", r"\toprule", head + r" \\", r"\midrule"]
     for row in result["rows"]:
         cells = []
-        for name in names:
-            score, digits = row["scores"].get(name), METRICS[name].digits
+        for metric in metrics:
+            score, digits = row["scores"].get(metric.key), metric.digits
             if score is None:
                 cells.append("--")
                 continue
@@ -81,13 +82,13 @@ def latex(result: dict[str, Any]) -> str:
 
 
 def check_comparable(results: dict[str, dict[str, Any]]) -> None:
-    """Refuse to put reports side by side that are not of the same thing.
+    """Refuse to compare reports of different conditions.
 
     Args:
-        results: contents of ``report.json`` files by their names.
+        results: contents of ``report.json`` files by name.
 
     Raises:
-        InputError: of different skeletons, corpora, splits, numbers of samples or feature networks.
+        InputError: different skeletons, corpora, splits, numbers of samples, feature networks or classifiers.
     """
     (first, reference), *others = results.items()
     for name, result in others:
@@ -101,10 +102,10 @@ def check_comparable(results: dict[str, dict[str, Any]]) -> None:
 
 
 def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Reports of the same thing as one: every model of each, and the baselines once.
+    """Several reports as one: the models of all, and the baselines once.
 
     Args:
-        results: contents of ``report.json`` files by their names.
+        results: contents of ``report.json`` files by name.
 
     Raises:
         InputError: see :func:`check_comparable`.
@@ -117,13 +118,20 @@ def merge(results: dict[str, dict[str, Any]]) -> dict[str, Any]:
     for report, result in results.items():
         for row in result["rows"]:
             if row["name"] in BASELINES:
-                baselines.setdefault(row["name"], row)
+                # One report may have metrics that another one lacks.
+                earlier = baselines.get(row["name"], row)
+                baselines[row["name"]] = {**earlier, "scores": row["scores"] | earlier["scores"]}
                 continue
             name = f"{row['name']} ({report})" if names.count(row["name"]) > 1 else row["name"]
             rows.append({**row, "name": name})
             if row["name"] in result.get("audits", {}):
                 audits[name] = result["audits"][row["name"]]
-    about = next(iter(results.values()))["about"]
+    about = dict(next(iter(results.values()))["about"])
+    extra = {
+        key: values for result in results.values() for key, values in result["about"].get("extra_metrics", {}).items()
+    }
+    if extra:
+        about["extra_metrics"] = extra
     return {"about": about, "rows": [*rows, *baselines.values()], "audits": audits}
 
 
@@ -131,7 +139,7 @@ def read_report(folder: Path) -> dict[str, Any]:
     """The contents of a report's ``report.json``.
 
     Raises:
-        InputError: there is none, or it is not a report's.
+        InputError: no such file, or not a report.
     """
     path = folder / "report.json"
     if not path.is_file():
@@ -142,19 +150,19 @@ def read_report(folder: Path) -> dict[str, Any]:
         or not isinstance(value.get("about"), dict)
         or not isinstance(value.get("rows"), list)
     ):
-        raise InputError(f"{path}: is not a report of 'a2g evaluate'; make it anew.")
+        raise InputError(f"{path}: is not a report of 'a2g evaluate'; run that again.")
     return value
 
 
 def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
-    """Whether a run listens, as a section."""
+    """The section of a run's audit."""
     lines = [
         f"## Does {name} listen?",
         "",
         f"{'; '.join(audit['verdicts'])}. ({audit['clips']} clips; another seed changes the wrists' motion by"
         f" {audit['sampling_cm']:.1f} cm.)",
         "",
-        "| heard | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
+        "| audio | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
         "| --- | --- | --- | --- |",
     ]
     for condition, row in audit["conditions"].items():
@@ -165,23 +173,31 @@ def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
-def _metrics(result: dict[str, Any]) -> list[str]:
-    there = {name for row in result["rows"] for name in row["scores"]}
-    return [name for name in METRICS if name in there]
+def describe_metrics(metrics: Sequence[Metric]) -> dict[str, dict[str, Any]]:
+    """Titles, units and so on of metrics of other packages, for ``about``: the JSON is readable without them."""
+    names = ("title", "unit", "better", "source", "digits", "against_target")
+    return {metric.key: {name: getattr(metric, name) for name in names} for metric in metrics}
 
 
-def _unit(name: str, about: dict[str, Any]) -> str:
+def _metrics(result: dict[str, Any]) -> list[Metric]:
+    """The metrics that any row has."""
+    extra = {key: Metric(key=key, **values) for key, values in result["about"].get("extra_metrics", {}).items()}
+    scored = {name for row in result["rows"] for name in row["scores"]}
+    return [metric for metric in (METRICS | extra).values() if metric.key in scored]
+
+
+def _unit(metric: Metric, about: dict[str, Any]) -> str:
     """Lengths are centimetres and metres, or the corpus's own unit where it has no metres."""
-    unit = METRICS[name].unit
+    unit = metric.unit
     if unit and about.get("unit", "cm") != "cm":
         unit = unit.replace("cm", about["unit"]).replace("m/", f"{about['unit']}/")
     return f", {unit}" if unit else ""
 
 
-def _cell(score: dict[str, Any] | None, name: str) -> str:
+def _cell(score: dict[str, Any] | None, metric: Metric) -> str:
     if score is None:
         return "-"
-    digits = METRICS[name].digits
+    digits = metric.digits
     text = f"{score['mean']:.{digits}f}"
     if score["low"] is not None and score["low"] == score["low"]:
         text += f" [{score['low']:.{digits}f}, {score['high']:.{digits}f}]"
@@ -201,28 +217,29 @@ def _preface(about: dict[str, Any]) -> list[str]:
 
 
 def _notes(about: dict[str, Any]) -> list[str]:
-    few = " There are few clips, so intervals are wide and understate what is not known." if about["clips"] < 10 else ""
+    few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
     if about["clips"] > about["stretches"]:
         few = (
-            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals are"
-            " narrower than what is not known, and say nothing about other recordings or speakers."
+            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals"
+            " understate the uncertainty, and do not extend to other recordings or speakers."
         )
     notes = [
         "Brackets hold 95 % intervals over clips (bootstrap)." + few,
         "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",
-        "↓ less is better, ↑ more is better, ≈ as the truth is better. Beat alignment has no zero: see what the other"
-        " rows score. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at 20.",
-        "No score here is a claim about what people would prefer.",
+        "↓ lower is better, ↑ higher is better, ≈ nearer to the truth is better. Beat alignment has no zero: compare"
+        " with the other rows. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at"
+        " 20 samples.",
+        "No score here measures what people prefer.",
     ]
     if about["feature_network"] is not None:
         floor = "" if about["floor"] is None else f" two halves of the truth are {about['floor']:.2f} apart;"
         notes.append(
-            f"FGD and LPIPS are by the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
-            f" vectors a set;{floor} FGD falls with n."
+            f"FGD and LPIPS use the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
+            f" vectors in a set;{floor} FGD falls with n."
             + (
                 ""
                 if about.get("own_features", True)
-                else " The network was trained on another corpus: movement that was rare there weighs too much here."
+                else " The network was trained on another corpus: movement that is rare there has too much weight here."
             )
         )
     return [f"- {note}" for note in notes]
@@ -235,32 +252,30 @@ def _picture(result: dict[str, Any], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    names, rows = _metrics(result), result["rows"]
+    metrics, rows = _metrics(result), result["rows"]
     columns = 4
-    lines = -(-len(names) // columns)
+    lines = -(-len(metrics) // columns)
     height = 0.24 * len(rows) + 0.7
     figure, axes = pyplot.subplots(
         lines, columns, figsize=(13, lines * height), sharey=True, squeeze=False, layout="constrained"
     )
     models = sum(row["name"] not in BASELINES for row in rows)
-    for panel, name in zip(axes.flat, names, strict=False):
+    for panel, metric in zip(axes.flat, metrics, strict=False):
         for place, row in enumerate(rows):
-            score = row["scores"].get(name)
+            score = row["scores"].get(metric.key)
             if score is None:
                 continue
             colour = "#2f6fde" if place < models else "#b7c0cc"
             panel.barh(place, score["mean"], color=colour, height=0.7)
             if score["low"] is not None:
                 panel.plot([score["low"], score["high"]], [place, place], color="#1b2433", linewidth=1.4)
-        values = sorted(row["scores"][name]["mean"] for row in rows if name in row["scores"])
+        values = sorted(row["scores"][metric.key]["mean"] for row in rows if metric.key in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
-            panel.set_xlim(0, 1.6 * values[-2])  # one row beyond all others would flatten them
-        panel.set_title(
-            f"{METRICS[name].title}{_unit(name, result['about'])} {_ARROWS[METRICS[name].better]}", fontsize=9
-        )
+            panel.set_xlim(0, 1.6 * values[-2])  # so that one row far beyond the others does not flatten them
+        panel.set_title(f"{metric.title}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9)
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
-    for panel in list(axes.flat)[len(names) :]:
+    for panel in list(axes.flat)[len(metrics) :]:
         panel.set_visible(False)
     axes[0, 0].set_yticks(range(len(rows)), [row["name"] for row in rows])
     axes[0, 0].invert_yaxis()

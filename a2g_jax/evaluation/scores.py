@@ -1,7 +1,9 @@
-"""Scores of one motion for one stretch of a corpus, and of several for the same audio."""
+"""Scores of motions: the metrics of :mod:`a2g_jax.metrics.catalogue` on stretches of a corpus."""
 
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
 
 import jax
 import numpy as np
@@ -9,152 +11,108 @@ from jaxtyping import Float
 
 from a2g_jax.evaluation.emotion_judge import EmotionJudge
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.places import Body, Points, Pose
-from a2g_jax.features import similarity
-from a2g_jax.metrics import beats, distribution, diversity, physical, pointwise, semantic
+from a2g_jax.evaluation.arrays import Points, Pose
+from a2g_jax.geometry.pose_space import PoseSpace
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.metrics import pointwise
+from a2g_jax.metrics.catalogue import METRICS as METRICS
+from a2g_jax.metrics.context import ClipContext, MotionContext, PairContext, SetContext
+from a2g_jax.metrics.registry import Metric as Metric
 
-
-class Metric(NamedTuple):
-    """What a score is called and how it is read."""
-
-    title: str
-    unit: str
-    better: str
-    """``"lower"``, ``"higher"``, or ``"truth"``: near what the truth has."""
-    source: str
-    digits: int = 3
-
-
-_A2G = "Audio2Gestures, extended"
-METRICS: dict[str, Metric] = {
-    "position_l1": Metric("position L1", "cm", "lower", f"{_A2G}, Eq. 22", 2),
-    "position_l1_star": Metric("position L1*", "cm", "lower", f"{_A2G}, Eq. 23", 2),
-    "position_l2": Metric("position L2", "cm", "lower", "EmotionGesture", 2),
-    "speed_l1": Metric("speed L1", "cm/s", "lower", f"{_A2G}, Sec. 5.2.1", 1),
-    "acceleration_l1": Metric("acceleration L1", "m/s2", "lower", f"{_A2G}, Sec. 5.2.1", 2),
-    "pck": Metric("PCK", "", "higher", f"{_A2G}, Eq. 24"),
-    "mpjre": Metric("joint rotation error", "degrees", "lower", "EmotionGesture", 1),
-    "stft": Metric("STFT", "", "lower", f"{_A2G}, Eq. 6"),
-    "ssim": Metric("SSIM", "", "higher", f"{_A2G}, Eq. 7"),
-    "lpips": Metric("LPIPS", "", "lower", f"{_A2G}, Eq. 14", 1),
-    "fgd": Metric("FGD", "", "lower", f"{_A2G}, Eq. 25", 2),
-    "diversity": Metric("diversity", "cm", "truth", f"{_A2G}, Eq. 26", 2),
-    "multimodality": Metric("multimodality", "cm", "truth", f"{_A2G}, Eq. 27", 2),
-    "beat_alignment": Metric("beat alignment, motion to audio, 5 frames", "", "truth", "stylized flow"),
-    "beat_alignment_audio": Metric("beat alignment, audio to motion, 0.1 s", "", "truth", "BEAT"),
-    "srgr": Metric("SRGR", "", "higher", "BEAT, bounded form"),
-    "emotion_accuracy": Metric("emotion accuracy", "", "higher", "EmotionGesture"),
-    "l1_div": Metric("L1div", "cm", "truth", "BEAT", 0),
-    "chi": Metric("CHI of speakers", "", "truth", "stylized flow, Table 3", 1),
-    "silhouette": Metric("silhouette of speakers", "", "truth", "stylized flow, Table 3"),
-    "speed_hellinger": Metric("wrist speeds, Hellinger", "", "lower", "GENEA"),
-    "jerk": Metric("wrist jerk, 90th percentile", "m/s3", "truth", "GENEA", 0),
-}
-#: Metrics that compare with the truth frame by frame or window by window; a report's first table.
-AGAINST_TRUTH = (
-    *("position_l1", "position_l1_star", "position_l2", "speed_l1", "acceleration_l1", "pck", "mpjre", "stft", "ssim"),
-    *("lpips", "srgr"),
-)
-#: Metrics that are a number for each motion; the others are one for a clip, or one for all.
-PER_SAMPLE = tuple(name for name in METRICS if name not in ("fgd", "multimodality", "chi", "silhouette"))
-
-
-@dataclass(frozen=True, eq=False)
-class Scorer:
-    """Everything that scoring needs besides motions."""
-
-    body: Body
-    fps: float
-    network: FeatureNetwork | None
-    judge: EmotionJudge | None = None
-
-    def sample(self, pose: Pose, target: "Target") -> dict[str, float]:
-        """Scores of one motion."""
-        body, fps = self.body, self.fps
-        places = body.places(pose)
-        scores: dict[str, Any] = dict(_against(places, target.places, body.near(target.places), fps, body.scale))
-        rotations, theirs = body.rotations(pose), body.rotations(target.pose)
-        if rotations is not None and theirs is not None:
-            scores["mpjre"] = _rotation_error(rotations, theirs)
-        reach = body.reach()
-        if reach is not None:
-            scores["position_l1_star"] = scores["position_l1"] * pointwise.REFERENCE_WRIST_TO_WRIST / reach
-        if target.relevance is not None:
-            scores["srgr"] = semantic.srgr(places, target.places, target.relevance, body.near(target.places) / 2)
-        if self.judge is not None:
-            scores["emotion_accuracy"] = self.judge.accuracy(pose, target.emotion)
-        scores["diversity"] = body.scale * _clip_distance(places)
-        scores["l1_div"] = body.scale * diversity.l1_div(places, None)
-        moves = beats.motion_beats(places, fps, smoothing=2.0 / fps)
-        # Authors count five frames at fifteen a second.
-        scores["beat_alignment"] = beats.beat_alignment(moves, target.onsets, beats.FLOW_SIGMA_FRAMES / fps)
-        scores["beat_alignment_audio"] = beats.beat_alignment(target.onsets, moves, beats.BEAT_SIGMA)
-        wrists = body.wrists(places)
-        scores["jerk"] = float(np.percentile(np.asarray(physical.jerk(wrists, fps)), 90))
-        speeds = np.asarray(physical.speeds(body.wrists(target.places), fps)).ravel()
-        ours = np.asarray(physical.speeds(wrists, fps)).ravel()
-        if body.metres:
-            scores["speed_hellinger"] = distribution.speed_hellinger(ours, speeds)
-        if self.network is not None:
-            scores["lpips"] = self._lpips(pose, target.pose)
-        return {name: float(value) for name, value in scores.items()}
-
-    def multimodality(self, poses: list[Pose]) -> float:
-        """Mean distance of several motions for one audio from each other."""
-        if len(poses) < 2:
-            return float("nan")
-        return self.body.scale * diversity.mean_pair_distance(np.stack([self.body.places(pose) for pose in poses]))
-
-    def features(self, pose: Pose) -> Float[np.ndarray, "n F"]:
-        """Vectors for the Fréchet distance; none without a network."""
-        return np.zeros((0, 1), np.float32) if self.network is None else self.network.clip_features(pose)
-
-    def _lpips(self, pose: Pose, target: Pose) -> float:
-        """Between time-averaged features of clips (Sec. 5.2.1), summed over blocks, averaged over clips."""
-        assert self.network is not None
-        frames = self.network.clip_frames
-        count = len(pose) // frames
-        if count == 0:
-            return float("nan")
-        clips = [each[: count * frames].reshape(count, frames, *each.shape[1:]) for each in (pose, target)]
-        ours, theirs = (
-            [block.mean(axis=1, keepdims=True) for block in self.network.blocks(np.asarray(clip, np.float32))]
-            for clip in clips
-        )
-        return float(np.mean(np.asarray(similarity.lpips(ours, theirs))))
+#: Metrics that are a number for each motion; the others are one for a clip, or one for a split.
+PER_SAMPLE = tuple(name for name, metric in METRICS.items() if metric.per_sample)
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """The truth of a stretch, the onsets of its speech in seconds, and what is known of it."""
+    """The recorded motion of a stretch, and what is annotated for it."""
 
     pose: Pose
     places: Points
     onsets: Float[np.ndarray, " n"]
+    """Onsets of the speech, seconds."""
     emotion: str = ""
     relevance: Float[np.ndarray, " T"] | None = None
-    """Of each frame, how much its gesture means."""
+    """Semantic relevance of each frame."""
 
 
-def _clip_distance(places: Points) -> float:
-    """Mean distance of a motion's clips from each other; NaN for a motion of one clip."""
-    clips = diversity.clips_of(places)
-    return diversity.mean_pair_distance(clips) if len(clips) > 1 else float("nan")
+@dataclass(frozen=True, eq=False)
+class Scorer:
+    """Computes the metrics; holds everything they need besides motions."""
+
+    space: PoseSpace
+    fps: float
+    network: FeatureNetwork | None
+    judge: EmotionJudge | None = None
+    extra_metrics: tuple[Metric, ...] = ()
+    """Metrics of other packages, after :data:`METRICS`."""
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """All metrics, in the order of a report."""
+        return (*METRICS.values(), *self.extra_metrics)
+
+    def context(self, pose: Pose, target: Target) -> MotionContext:
+        """Everything that a metric may look at for one motion, with the compiled metrics computed."""
+        context = MotionContext(
+            pose=pose,
+            target_pose=target.pose,
+            positions=self.space.positions(pose),
+            target_positions=target.places,
+            fps=self.fps,
+            metres=self.space.metres,
+            onsets=target.onsets,
+            rotations_of=self.space.read,
+            wrists_of=self.space.wrists,
+            wrist_to_wrist=self._wrist_to_wrist,
+            emotion=target.emotion,
+            relevance=target.relevance,
+            network=self.network,
+            classifier=self.judge,
+        )
+        compiled = tuple(metric for metric in self.metrics if metric.scope == "pair")
+        return replace(context, pair_scores=_pair_scores(compiled, context.pair))
+
+    def motion_scores(self, context: MotionContext) -> dict[str, float]:
+        """Metrics of one motion; those that are not defined for it are left out."""
+        values = {
+            metric.key: context.pair_scores[metric.key] if metric.scope == "pair" else _value(metric, context)
+            for metric in self.metrics
+            if metric.per_sample
+        }
+        return {key: float(value) for key, value in values.items() if value is not None}
+
+    def sample(self, pose: Pose, target: Target) -> dict[str, float]:
+        """:meth:`motion_scores` of a pose."""
+        return self.motion_scores(self.context(pose, target))
+
+    def clip_scores(self, motions: Sequence[MotionContext]) -> dict[str, float]:
+        """Metrics of several motions for one clip."""
+        clip = ClipContext(tuple(motions))
+        values = {metric.key: _value(metric, clip) for metric in self.metrics if metric.scope == "clip"}
+        return {key: float(value) for key, value in values.items() if value is not None}
+
+    def set_scores(self, split: SetContext) -> dict[str, float]:
+        """Metrics of one motion for every clip of a split."""
+        values = {metric.key: _value(metric, split) for metric in self.metrics if metric.scope == "set"}
+        return {key: float(value) for key, value in values.items() if value is not None}
+
+    def features(self, pose: Pose) -> Float[np.ndarray, "n F"]:
+        """Feature vectors of a motion's clips; none without a network."""
+        return np.zeros((0, 1), np.float32) if self.network is None else self.network.clip_features(pose)
+
+    @cached_property
+    def _wrist_to_wrist(self) -> float | None:
+        body = self.space.body
+        return pointwise.wrist_to_wrist(body) if isinstance(body, Skeleton) else None
 
 
-_rotation_error = jax.jit(pointwise.joint_rotation_error)
+def _value(metric: Metric, context: Any) -> Any:
+    assert metric.function is not None
+    return metric.function(context)
 
 
-@jax.jit
-def _against(places, target, near, fps, scale):
-    """Everything that compares point by point, in one program."""
-    flat = lambda array: array.reshape(array.shape[0], -1)  # noqa: E731
-    return {
-        "position_l1": scale * pointwise.position_l1(places, target),
-        "position_l2": scale * pointwise.position_l2(places, target),
-        "speed_l1": scale * fps * pointwise.speed_l1(places, target),
-        "acceleration_l1": fps**2 * pointwise.acceleration_l1(places, target),
-        "pck": pointwise.pck(places, target, near),
-        "stft": similarity.stft_distance(flat(places), flat(target)),
-        "ssim": similarity.ssim(flat(places), flat(target)),
-    }
+@partial(jax.jit, static_argnums=0)
+def _pair_scores(metrics: tuple[Metric, ...], pair: PairContext) -> dict[str, Any]:
+    """All metrics over pairs, in one program."""
+    return {metric.key: _value(metric, pair) for metric in metrics}

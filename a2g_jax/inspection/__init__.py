@@ -1,1 +1,1 @@
-"""What is in a file, a folder, a corpus or a run, and what may be wrong with it: ``a2g inspect``."""
+"""Contents of files, folders, corpora and runs, with their faults: ``a2g inspect``."""

@@ -6,18 +6,19 @@ from jaxtyping import Float
 from a2g_jax.features.mel import active_level_db
 from a2g_jax.inspection.finding import Finding, Place
 
-#: Samples in a row at the largest value that make a clipped peak; a peak of speech has one or two.
+#: Consecutive samples at the largest value that make a clipped peak; a peak of speech has one or two.
 CLIPPED_RUN = 3
-#: How near the largest value a sample must be to be cut off at it; a dithered 16-bit converter strays by less.
+#: Relative distance from the largest value within which a sample counts as clipped; a dithered 16-bit converter strays
+#: by less.
 CLIPPED_WITHIN = 1e-3
-#: Share of clipped samples that is heard as distortion; below it a few plosives hit the limit.
+#: Share of clipped samples from which distortion is audible; below it a few plosives hit the limit.
 CLIPPED_SHARE = 1e-4
 #: Seconds without speech, and decibels below the level of speech that count as silence. Pauses of a talking person
 #: last 2 to 4 s at most.
 SILENT_SECONDS, SILENT_BELOW = 5.0, 40.0
 #: A constant offset this many decibels below the level of speech shifts every window's lowest band.
 OFFSET_BELOW = 26.0
-#: Level of active speech, dB of full scale, below which 16-bit rounding and hum come close.
+#: Level of active speech, dB of full scale, below which 16-bit rounding and hum matter.
 FAINT = -50.0
 _BLOCK = 0.025
 
@@ -28,7 +29,7 @@ def peak_db(audio: Float[np.ndarray, " N"]) -> float:
 
 
 def clipped_share(audio: Float[np.ndarray, " N"]) -> tuple[float, int]:
-    """Share of samples that lie in flat peaks, and where the first is."""
+    """Share of samples that lie in flat peaks, and the first such sample."""
     size = np.abs(audio)
     flat = size >= (1 - CLIPPED_WITHIN) * size.max(initial=1e-9)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(np.int8))).reshape(-1, 2)
@@ -39,13 +40,13 @@ def clipped_share(audio: Float[np.ndarray, " N"]) -> tuple[float, int]:
 
 
 def check_clipping(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
-    """Peaks cut off at the largest value that the recorder, or a later step, could hold."""
+    """Peaks cut off at the limit of the recorder or of a later step."""
     share, first = clipped_share(audio)
     if share < CLIPPED_SHARE:
         return []
     message = f"{100 * share:.2f} % of the samples are clipped at {peak_db(audio):.1f} dB of full scale."
-    mend = "Record at a lower level, or use the original before it was amplified."
-    return [Finding("warning", "clipping", message, mend, Place(seconds=first / sample_rate), share)]
+    fix = "Record at a lower level, or use the original before it was amplified."
+    return [Finding("warning", "clipping", message, fix, Place(seconds=first / sample_rate), share)]
 
 
 def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
@@ -61,8 +62,8 @@ def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Find
     for start, stop in edges[edges[:, 1] - edges[:, 0] >= SILENT_SECONDS / _BLOCK]:
         seconds = float((stop - start) * _BLOCK)
         message = f"silent for {seconds:.1f} s."
-        mend = "Cut it out, unless the speaker listens meanwhile."
-        findings.append(Finding("warning", "silence", message, mend, Place(seconds=float(start * _BLOCK)), seconds))
+        fix = "Cut it out, unless the speaker is listening."
+        findings.append(Finding("warning", "silence", message, fix, Place(seconds=float(start * _BLOCK)), seconds))
     return findings
 
 

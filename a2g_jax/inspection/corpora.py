@@ -1,4 +1,4 @@
-"""Inspecting a corpus made by ``a2g prepare``."""
+"""Inspection of a corpus made by ``a2g prepare``."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -12,39 +12,39 @@ from a2g_jax.data.corpus import Corpus, Entry
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.inspection.alike import Print, bands_print, check_copies, poses_print
 from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.copies import Fingerprint, bands_fingerprint, check_copies, poses_fingerprint
 from a2g_jax.inspection.describe import try_rig
 from a2g_jax.inspection.finding import Finding, Place, located
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.report import Report
-from a2g_jax.inspection.sync import Offset, at_rate, check_offset, measure_offset, wrist_places
-from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.inspection.sync import Offset, at_rate, check_offset, measure_offset, wrist_positions
+from a2g_jax.inspection.tree import body_facts
 from a2g_jax.progress import progress_bar
 
-#: A standard deviation so far above the median one, or 0, is of a feature with outliers or without content.
+#: Ratio to the median standard deviation from which a feature has outliers.
 _WIDE = 20.0
 
 
 def inspect_corpus(path: Path) -> Report:
-    """Recordings, splits, statistics, and what is wrong with the arrays or shared between the splits.
+    """Recordings, splits and statistics of a corpus, with faults of its arrays and leaks between its splits.
 
     Raises:
-        InputError: it is no corpus, or a damaged one.
+        InputError: not a corpus, or a damaged one.
     """
     corpus = Corpus.open(path)
     findings = check_overlaps(corpus) + check_sources(corpus) + check_statistics(corpus)
-    heard: list[Print] = []
-    seen: list[Print] = []
+    audio_prints: list[Fingerprint] = []
+    motion_prints: list[Fingerprint] = []
     offsets: list[Offset] = []
     rig: Rig | None = None
     with progress_bar(len(corpus.recordings), "inspecting", "recording") as bar:
         for entry, audio, pose, root in _rows(corpus):
             faults = check_finite(audio, "audio features") + check_finite(pose, "poses") + check_finite(root, "root")
-            sound = 0 if faults else len(pose)
-            heard.append(bands_print(audio[:sound, : corpus.mel.bands], corpus.fps))
-            seen.append(poses_print(pose.reshape(len(pose), -1)[:sound], corpus.fps))
-            if not faults and isinstance(corpus.body, Skeleton) and corpus.representation in ("6d", "exponential"):
+            usable = 0 if faults else len(pose)
+            audio_prints.append(bands_fingerprint(audio[:usable, : corpus.mel.bands], corpus.fps))
+            motion_prints.append(poses_fingerprint(pose.reshape(len(pose), -1)[:usable], corpus.fps))
+            if not faults and corpus.space.has_rotations:
                 motion = corpus.motion(entry.first, entry.first + entry.frames)
                 if rig is None:
                     rig = try_rig(motion, str(path))[0]
@@ -58,11 +58,14 @@ def inspect_corpus(path: Path) -> Report:
             findings += located(faults, recording=entry.name)
             bar.update()
     names, parts = [entry.name for entry in corpus.recordings], _splits_of(corpus)
-    findings += check_copies("audio", heard, names, parts) + check_copies("motion", seen, names, parts)
+    findings += check_copies("audio", audio_prints, names, parts) + check_copies("motion", motion_prints, names, parts)
     facts = corpus_facts(corpus, rig)
-    if known := [offset.seconds for offset in offsets if offset.known]:
-        median = round(float(np.median(known)), 3)
-        facts["offset"] = {"told in": f"{len(known)} of {len(names)} recordings", "motion is late by (s)": median}
+    if measured := [offset.seconds for offset in offsets if offset.significant]:
+        median = round(float(np.median(measured)), 3)
+        facts["offset"] = {
+            "measured in": f"{len(measured)} of {len(names)} recordings",
+            "motion is late by (s)": median,
+        }
     return Report(str(path), "corpus", facts, findings)
 
 
@@ -74,7 +77,7 @@ def _rows(corpus: Corpus) -> Iterator[tuple[Entry, np.ndarray, np.ndarray, np.nd
 
 def _offset(motion: Motion, rig: Rig, bands: Float[np.ndarray, "T B"]) -> Offset | None:
     energy = 10 * np.log10(np.sum(10 ** (bands.astype(np.float64) / 10), axis=1))
-    return measure_offset(at_rate(energy, motion.fps), at_rate(wrist_places(motion, rig), motion.fps))
+    return measure_offset(at_rate(energy, motion.fps), at_rate(wrist_positions(motion, rig), motion.fps))
 
 
 def _splits_of(corpus: Corpus) -> list[frozenset[str]]:
@@ -86,7 +89,7 @@ def _splits_of(corpus: Corpus) -> list[frozenset[str]]:
 
 
 def check_overlaps(corpus: Corpus) -> list[Finding]:
-    """Frames of one recording that lie in two splits."""
+    """Findings on frames of one recording that lie in two splits."""
     by_recording: dict[int, list[tuple[int, int, str]]] = {}
     for name, segments in corpus.splits.items():
         for index, start, stop in segments:
@@ -99,13 +102,13 @@ def check_overlaps(corpus: Corpus) -> list[Finding]:
                 message = f"its frames {start} to {stop} lie in both {name} and {other}."
                 place = Place(recording=corpus.recordings[index].name, frame=start, seconds=start / corpus.fps)
                 findings.append(
-                    Finding("warning", "leak", message, "Prepare the corpus anew.", place, (stop - start) / corpus.fps)
+                    Finding("warning", "leak", message, "Prepare the corpus again.", place, (stop - start) / corpus.fps)
                 )
     return findings
 
 
 def check_sources(corpus: Corpus) -> list[Finding]:
-    """Recordings made from the same files."""
+    """Findings on recordings made from the same files."""
     parts = _splits_of(corpus)
     groups: dict[frozenset[str], list[int]] = {}
     for index, entry in enumerate(corpus.recordings):
@@ -120,38 +123,37 @@ def check_sources(corpus: Corpus) -> list[Finding]:
         message = f"{len(names)} recordings were made from the same files ({', '.join(names[:4])}"
         message += f"{', ...' if len(names) > 4 else ''})"
         if len(members) == 2 and len(splits) > 1:
-            mend = "Put both into one split; a test on what was trained on says nothing."
+            fix = "Put both into one split; otherwise the model is tested on training data."
             message += f", and they are in different splits ({' and '.join(sorted(splits))})."
-            findings.append(Finding("warning", "leak", message, mend, Place(recording=names[1])))
+            findings.append(Finding("warning", "leak", message, fix, Place(recording=names[1])))
         else:
-            # Databases hold many clips in one file; what they share is found by content.
+            # Databases hold many clips in one file; common stretches are found by content.
             findings.append(Finding("info", "same-files", f"{message}.", value=float(len(names))))
     return findings
 
 
 def check_statistics(corpus: Corpus) -> list[Finding]:
-    """Standard deviations that no normalisation should divide by."""
+    """Findings on standard deviations that are unfit for normalisation."""
     findings = []
     for name, statistics in corpus.statistics.items():
         std = np.asarray(statistics.std, np.float64)
         if (wide := std > _WIDE * np.median(std)).any() and name == "audio":
-            message = (
-                f"the spread of {int(wide.sum())} of {std.size} values of {name} is over {_WIDE:g} times the usual."
-            )
+            count = f"{int(wide.sum())} of {std.size} values of {name}"
+            message = f"the standard deviation of {count} is over {_WIDE:g} times the median."
             findings.append(Finding("warning", "statistics", message, "Look for outliers in the recordings."))
-        findings += check_finite(std, f"the spread of {name}")
+        findings += check_finite(std, f"the standard deviation of {name}")
     return findings
 
 
 def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
-    """What a corpus holds."""
+    """The facts of a corpus."""
     seconds = {name: sum(segment.frames for segment in parts) / corpus.fps for name, parts in corpus.splits.items()}
     facts: dict[str, Any] = {
         "corpus": {
             "recordings": len(corpus.recordings),
             "minutes": round(corpus.frames / corpus.fps / 60, 2),
             "fps": corpus.fps,
-            "pose": f"{corpus.representation}, {corpus.rows} rows",
+            "pose": f"{corpus.space.kind}, {corpus.rows} rows",
             "audio": f"{corpus.mel.width} values a frame ({corpus.mel.bands} bands at {corpus.mel.sample_rate} Hz)",
             "fingerprint": corpus.fingerprint,
             "made by": {name: value for name, value in corpus.recipe.items() if name in ("reader", "source", "seed")},
@@ -169,15 +171,7 @@ def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
     }
     if corpus.on_demand:
         facts["corpus"]["generated in training"] = f"{corpus.parts - 1} more parts"
-    if isinstance(corpus.body, Skeleton):
-        facts["skeleton"] = skeleton_facts(corpus.body, rig)
-    else:
-        names = corpus.body.names
-        facts["points"] = {
-            "names": list(names),
-            "bones": [f"{names[start]}-{names[end]}" for start, end in corpus.body.bones],
-        }
-    return facts
+    return facts | body_facts(corpus.body, rig)
 
 
 def _minutes(corpus: Corpus, label: str) -> dict[str, float]:

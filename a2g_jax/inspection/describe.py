@@ -1,4 +1,4 @@
-"""The numbers of a motion and of a speech recording."""
+"""Facts of motions, speech recordings and transcripts."""
 
 from typing import Any
 
@@ -19,17 +19,17 @@ _TRACKED = ("L_Wrist", "R_Wrist", "Head")
 
 
 def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
-    """The body in a motion, or an info that there is none to be found."""
+    """The body of a motion, or a note that none is found."""
     try:
         return find_rig(motion, name=path), []
     except InputError as error:
         message = f"no body is found in the skeleton ({error})"
-        mend = "What needs a body (retargeting, speeds of the hands, the offset) is left out."
-        return None, [Finding("info", "no-body", " ".join(message.split()), mend)]
+        fix = "Facts that need a body (speeds of the hands, the offset) are left out; retargeting is not possible."
+        return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
 
 
 def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
-    """Length, rate, how far joints turn, how fast hands and head move and where they reach."""
+    """Length, frame rate, rotation ranges of joints, speed and reach of hands and head."""
     facts: dict[str, Any] = {
         "frames": motion.frames,
         "fps": round(motion.fps, 6),
@@ -38,22 +38,22 @@ def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
     }
     if motion.frames > 1:
         steps = rotation_steps(motion) * motion.fps
-        facts["turning (degrees/s)"] = _percentiles(steps.max(axis=1))
+        facts["rotation speed (degrees/s)"] = _percentiles(steps.max(axis=1))
         rotations = np.asarray(motion.rotations)
         ranges = rotation_angle(rotations, np.broadcast_to(rotations[:1], rotations.shape)).max(axis=0)
         widest = np.argsort(-ranges)[:5]
-        facts["turned farthest from frame 0 (degrees)"] = {
+        facts["largest rotation from frame 0 (degrees)"] = {
             motion.skeleton.names[j]: round(float(ranges[j]), 1) for j in widest
         }
     if rig is None or motion.frames < 2:
         return facts
     world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
-    places = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
-    places = (places + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
-    chest = places[:, rig.roles["Chest"]]
+    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
+    positions = (positions + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+    chest = positions[:, rig.roles["Chest"]]
     for part in _TRACKED:
         if part in rig.roles:
-            path = places[:, rig.roles[part]]
+            path = positions[:, rig.roles[part]]
             speed = np.linalg.norm(np.diff(path, axis=0), axis=1) * motion.fps
             facts[f"{part} speed (m/s)"] = _percentiles(speed)
             facts[f"{part} from the chest (m; left, up, forward)"] = _box(path - chest)
@@ -61,7 +61,7 @@ def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
 
 
 def audio_facts(audio: Float[np.ndarray, " N"], sample_rate: int) -> dict[str, Any]:
-    """Length and loudness."""
+    """Length and level."""
     return {
         "seconds": round(len(audio) / sample_rate, 3),
         "active level (dBFS)": round(active_level_db(audio, sample_rate), 1),
@@ -72,7 +72,7 @@ def audio_facts(audio: Float[np.ndarray, " N"], sample_rate: int) -> dict[str, A
 
 
 def word_facts(words: tuple[Word, ...]) -> dict[str, Any]:
-    """How many words there are, how fast and until when."""
+    """Number, rate and times of words."""
     if not words:
         return {"words": 0}
     lengths = np.array([word.end - word.start for word in words])

@@ -1,4 +1,4 @@
-"""Inspecting one file, or a motion with its audio."""
+"""Inspection of one file, or of a motion with its audio."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +12,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.audio_checks import check_audio
-from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_what_there_is, scan_bvh
+from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_first_frames, scan_bvh
 from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
 from a2g_jax.inspection.finding import Finding, Place, located
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
@@ -23,7 +23,7 @@ from a2g_jax.inspection.sync import (
     check_offset,
     energy_db,
     measure_offset,
-    wrist_places,
+    wrist_positions,
 )
 from a2g_jax.inspection.tree import skeleton_facts
 from a2g_jax.io.audio import audio_info, read_audio
@@ -35,13 +35,13 @@ from a2g_jax.io.words import Word
 SAMPLE_RATE = 16000
 AUDIO = (".wav", ".flac", ".ogg", ".mp3", ".aiff", ".aif", ".au", ".w64", ".caf", ".opus")
 TRANSCRIPTS = (".textgrid", ".json", ".tsv")
-#: Seconds by which a transcript's last word may outlast the audio; aligners round.
+#: Seconds by which the last word of a transcript may end after the audio; aligners round.
 _WORDS_BEYOND = 0.25
 
 
 @dataclass(eq=False)
 class Inspected:
-    """What was found in one file."""
+    """Facts and findings of one file, with its contents."""
 
     path: str
     kind: str
@@ -54,10 +54,10 @@ class Inspected:
 
 
 def inspect_file(path: Path) -> Inspected:
-    """What a file holds, by its suffix.
+    """Inspect a file by its suffix.
 
     Raises:
-        InputError: no such file, of no kind that is known, or too damaged to say anything about it.
+        InputError: no such file, of an unknown kind, or too damaged to read.
     """
     suffix = path.suffix.lower()
     if suffix == ".bvh":
@@ -69,17 +69,17 @@ def inspect_file(path: Path) -> Inspected:
     if suffix in TRANSCRIPTS:
         words = read_transcript(path)
         return Inspected(str(path), "transcript", {"words": word_facts(words)}, words=words)
-    known = ", ".join((".bvh", ".npz", *AUDIO[:4], *TRANSCRIPTS))
-    raise InputError(f"{path}: is nothing that can be inspected; expected {known}, a folder, a corpus or a run.")
+    kinds = ", ".join((".bvh", ".npz", *AUDIO[:4], *TRANSCRIPTS))
+    raise InputError(f"{path}: cannot be inspected; expected {kinds}, a folder, a corpus or a run.")
 
 
 def inspect_bvh(path: Path) -> Inspected:
-    """A BVH file; what its header gets wrong becomes a warning, and the frames that can be read are looked at."""
+    """Inspect a BVH file; faults of the header become warnings, and the readable frames are inspected."""
     file = scan_bvh(path)
     findings = check_frame_count(file)
     faults, values = check_rows(file)
     findings += faults
-    motion = read_what_there_is(path, file, len(values))
+    motion = read_first_frames(path, file, len(values))
     facts: dict[str, Any] = {
         "file": {
             "frames by the header": file.claimed,
@@ -105,7 +105,7 @@ def _with_motion(path: Path, kind: str, motion: Motion, facts: dict[str, Any]) -
 
 
 def inspect_audio(path: Path) -> Inspected:
-    """A speech recording."""
+    """Inspect a speech recording."""
     info = audio_info(path)
     facts: dict[str, Any] = {
         "file": {
@@ -115,7 +115,7 @@ def inspect_audio(path: Path) -> Inspected:
             "format": f"{info.format} {info.subtype}",
         }
     }
-    # At its own rate, since resampling rounds off what was clipped.
+    # At its own rate, since resampling smooths clipped peaks.
     audio = read_audio(path, info.sample_rate)
     facts["audio"] = audio_facts(audio, info.sample_rate)
     findings = located(check_audio(audio, info.sample_rate), path=str(path))
@@ -123,7 +123,7 @@ def inspect_audio(path: Path) -> Inspected:
 
 
 def inspect_npz(path: Path) -> Inspected:
-    """Arrays: a motion of this package, SMPL-X parameters as in BEAT2, or any others."""
+    """Inspect arrays: a motion of this package, SMPL-X parameters as in BEAT2, or any others."""
     arrays = read_npz(path)
     facts: dict[str, Any] = {"arrays": {name: f"{array.dtype} {tuple(array.shape)}" for name, array in arrays.items()}}
     findings = [
@@ -146,16 +146,16 @@ def _smplx(path: Path, arrays: dict[str, np.ndarray]) -> Motion:
         raise InputError(f"{path}, trans: has {len(trans)} frames; 'poses' has {len(poses)}.")
     rate = arrays["mocap_frame_rate"]
     if rate.size != 1 or rate.dtype.kind not in "iuf" or not 1 <= float(rate.reshape(-1)[0]) <= 1000:
-        raise InputError(f"{path}, mocap_frame_rate: expected frames a second, such as 30.")
-    turns = np.concatenate([poses[:, BODY], poses[:, HANDS]], axis=1)
-    return smplx_motion(turns, trans, float(rate.reshape(-1)[0]), str(path))
+        raise InputError(f"{path}, mocap_frame_rate: expected frames per second, such as 30.")
+    axis_angles = np.concatenate([poses[:, BODY], poses[:, HANDS]], axis=1)
+    return smplx_motion(axis_angles, trans, float(rate.reshape(-1)[0]), str(path))
 
 
 def inspect_together(first: Inspected, audio: Inspected) -> Inspected:
-    """A motion or a transcript with the audio that belongs to it.
+    """Inspect a motion or a transcript together with its audio.
 
     Raises:
-        InputError: the first is neither, or the second no audio.
+        InputError: the first is neither, or the second is no audio.
     """
     if audio.audio is None:
         raise InputError(f"{audio.path}: is no audio; name a WAV or FLAC file with --audio.")
@@ -173,7 +173,7 @@ def inspect_together(first: Inspected, audio: Inspected) -> Inspected:
     elif first.words is not None:
         findings = check_words(first.words, seconds)
     else:
-        raise InputError(f"{first.path}: is neither a motion nor a transcript; --audio says nothing about it.")
+        raise InputError(f"{first.path}: is neither a motion nor a transcript; leave --audio out.")
     facts = {**first.facts, "audio file": audio.facts["file"], "audio": audio.facts["audio"], "together": together}
     facts["skeleton"] = facts.pop("skeleton", None)
     facts = {name: section for name, section in facts.items() if section}
@@ -183,25 +183,25 @@ def inspect_together(first: Inspected, audio: Inspected) -> Inspected:
 
 def _offset(motion: Motion, rig: Rig, audio: Float[np.ndarray, " N"]) -> Offset | None:
     seconds = min(motion.seconds, len(audio) / SAMPLE_RATE)
-    wrists = at_rate(wrist_places(motion, rig), motion.fps)
+    wrists = at_rate(wrist_positions(motion, rig), motion.fps)
     return measure_offset(energy_db(audio, SAMPLE_RATE, seconds), wrists)
 
 
 def offset_text(offset: Offset | None) -> str:
-    """A measured offset in words."""
+    """A measured offset as text."""
     if offset is None:
-        return "cannot be told (too short, or no speech or motion)"
-    height = f"{offset.deviations:.1f} standard deviations above chance; known from 5"
-    if not offset.known:
-        return f"cannot be told ({height})"
-    return f"motion {offset.seconds:+.2f} s against the speech ({height})"
+        return "cannot be measured (too short, or no speech or motion)"
+    height = f"{offset.deviations:.1f} standard deviations above chance; significant from 5"
+    if not offset.significant:
+        return f"not significant ({height})"
+    return f"motion {offset.seconds:+.2f} s relative to the speech ({height})"
 
 
 def check_words(words: tuple[Word, ...], audio_seconds: float) -> list[Finding]:
-    """A transcript against the length of the audio."""
+    """Findings on a transcript that is longer than the audio."""
     late = [word for word in words if word.end > audio_seconds + _WORDS_BEYOND]
     if not late:
         return []
     message = f"{len(late)} words lie after the end of the audio at {audio_seconds:.2f} s, the first {late[0].text!r}."
-    mend = "Is it the transcript of another take?"
-    return [Finding("warning", "words-beyond", message, mend, Place(seconds=late[0].start), float(len(late)))]
+    fix = "Is it the transcript of another take?"
+    return [Finding("warning", "words-beyond", message, fix, Place(seconds=late[0].start), float(len(late)))]

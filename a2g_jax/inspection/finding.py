@@ -1,4 +1,4 @@
-"""What a check says: plain data, for printing and for JSON."""
+"""The results of checks, as plain data for printing and for JSON."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class Place:
-    """Where something was found; what does not apply is left out."""
+    """The place of a finding; fields that do not apply are empty."""
 
     path: str = ""
     recording: str = ""
@@ -26,21 +26,21 @@ class Place:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing worth knowing."""
+    """One result of a check."""
 
     severity: Literal["warning", "info"]
-    """A warning is a fault, or so likely one that somebody should look; an info is a fact that may surprise."""
+    """``"warning"``: a likely fault; ``"info"``: an unusual fact."""
     code: str
-    """Which check says it, such as ``"frozen"``; stable, for scripts."""
+    """The check, such as ``"frozen"``; stable, for scripts."""
     message: str
-    mend: str = ""
-    """What to do about it."""
+    fix: str = ""
+    """Remedy."""
     place: Place = field(default_factory=Place)
     value: float | None = None
-    """The measured number that the message speaks of."""
+    """The measured number in the message."""
 
     def to_json(self) -> dict[str, Any]:
-        """JSON values; the place without what does not apply."""
+        """JSON values; the place without fields that do not apply."""
         values = asdict(self)
         values["place"] = {name: value for name, value in values["place"].items() if value not in ("", None)}
         return values
@@ -48,11 +48,11 @@ class Finding:
     def line(self) -> str:
         """One line of text."""
         where = f"{self.place}: " if str(self.place) else ""
-        return f"[{self.code}] {where}{self.message}{f' {self.mend}' if self.mend else ''}"
+        return f"[{self.code}] {where}{self.message}{f' {self.fix}' if self.fix else ''}"
 
 
 def located(findings: Iterable[Finding], *, path: str = "", recording: str = "") -> list[Finding]:
-    """The findings with the file or the recording named that they are about, where they do not name one."""
+    """The findings with a file or recording filled in where they have none."""
     return [
         replace(
             finding,

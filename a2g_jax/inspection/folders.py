@@ -1,4 +1,4 @@
-"""Inspecting a folder of raw recordings: each pair of files, and all against each other."""
+"""Inspection of a folder of raw recordings: each pair of files, and all compared with each other."""
 
 from pathlib import Path
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from a2g_jax.data.folder import AUDIO_SUFFIXES, find_pairs
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.inspection.alike import Print, audio_print, check_copies, motion_print
+from a2g_jax.inspection.copies import Fingerprint, audio_fingerprint, check_copies, motion_fingerprint
 from a2g_jax.inspection.files import SAMPLE_RATE, Inspected, inspect_file, inspect_together
 from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.report import Report
@@ -15,14 +15,14 @@ from a2g_jax.progress import progress_bar
 
 
 def inspect_folder(folder: Path) -> Report:
-    """WAV and BVH files of equal names under a folder; files without a partner are looked at alone.
+    """Inspect WAV and BVH files of equal names under a folder; files without a partner alone.
 
     Raises:
-        InputError: there are no such files.
+        InputError: no such files.
     """
     pairs, findings = _find(folder)
     rows: list[dict[str, Any]] = []
-    prints: dict[str, tuple[list[Print], list[str]]] = {"audio": ([], []), "motion": ([], [])}
+    prints: dict[str, tuple[list[Fingerprint], list[str]]] = {"audio": ([], []), "motion": ([], [])}
     skeletons: list[Skeleton] = []
     names: list[str] = []
     with progress_bar(len(pairs), "inspecting", "recording") as bar:
@@ -31,10 +31,10 @@ def inspect_folder(folder: Path) -> Report:
             for item in found:
                 findings += item.findings
                 if item.audio is not None:
-                    prints["audio"][0].append(audio_print(item.audio, SAMPLE_RATE))
+                    prints["audio"][0].append(audio_fingerprint(item.audio, SAMPLE_RATE))
                     prints["audio"][1].append(name)
                 if item.motion is not None:
-                    prints["motion"][0].append(motion_print(item.motion))
+                    prints["motion"][0].append(motion_fingerprint(item.motion))
                     prints["motion"][1].append(name)
                     skeletons.append(item.motion.skeleton)
                     names.append(name)
@@ -47,7 +47,7 @@ def inspect_folder(folder: Path) -> Report:
 
 
 def _find(folder: Path) -> tuple[list[tuple[str, list[Path]]], list[Finding]]:
-    """What to inspect, and what is wrong with how it lies there."""
+    """The files of each recording, and findings on the layout of the folder."""
     try:
         pairs = find_pairs(folder)
         return [(str(bvh.relative_to(folder).with_suffix("")), [bvh, audio]) for audio, bvh in pairs], []
@@ -56,7 +56,7 @@ def _find(folder: Path) -> tuple[list[tuple[str, list[Path]]], list[Finding]]:
                  if path.suffix.lower() in (".bvh", *AUDIO_SUFFIXES) and not path.name.startswith(".")]  # fmt: skip
         if not files:
             raise
-        found = Finding("warning", "pairs", str(error), "Until then each file is looked at alone.")
+        found = Finding("warning", "pairs", str(error), "Until then each file is inspected alone.")
         return [(str(path.relative_to(folder)), [path]) for path in files], [found]
 
 

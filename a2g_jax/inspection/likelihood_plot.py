@@ -1,4 +1,4 @@
-"""A picture of how likely a motion is over time; needs Matplotlib."""
+"""A picture of a motion's log-likelihood over time; needs Matplotlib."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,11 +19,11 @@ def likelihood_over_time(
     log_likelihood: Float[np.ndarray, " N"],
     moments: Sequence[Moment] = (),
 ) -> None:
-    """Log-likelihood of every frame, its median with a band of three robust deviations, and the moments numbered.
+    """Log-likelihood of every frame, its median with a band of three robust standard deviations, numbered moments.
 
     Args:
-        axes: of Matplotlib.
-        moments: the least likely first, as they are numbered.
+        axes: Matplotlib axes.
+        moments: in the order of their numbers.
     """
     median, scale = robust_scale(log_likelihood)
     axes.axhspan(median - 3 * scale, median + 3 * scale, color=COLOURS[0], alpha=0.25, linewidth=0)

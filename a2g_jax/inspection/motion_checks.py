@@ -1,6 +1,6 @@
-"""Faults of a motion alone: joints that froze, rotations that flip, places that jump, frames that repeat.
+"""Faults of a motion alone: frozen joints, flipped rotations, jumps of the root, repeated frames.
 
-Every check is a pure function of a motion and says nothing about a sound one.
+Every check is a pure function of a motion and finds nothing in a sound one.
 """
 
 import numpy as np
@@ -11,20 +11,20 @@ from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.finding import Finding, Place
 
-#: Degrees between frames below which a rotation counts as unchanged: 100 times what float32 matrices round by.
+#: Degrees between frames below which a rotation counts as unchanged: 100 times the rounding of float32 matrices.
 STILL = 1e-3
 #: Seconds that a joint of a living arm, trunk or head cannot hold still to a thousandth of a degree.
 FROZEN_SECONDS = 1.0
-#: Degrees that something must have moved meanwhile; else the whole body is paused, which is a fault of its own kind.
+#: Degrees by which another joint must turn meanwhile; otherwise the whole body is paused, which is another fault.
 MOVES_MEANWHILE = 5.0
-#: A flip turns by more degrees than the first between two frames, and faster than any wrist, in degrees a second; at
-#: low rates, where a fast gesture turns far in a frame, the last number of degrees is enough.
+#: A flip exceeds the first number of degrees between two frames, and the speed of any wrist, in degrees per second; at
+#: low rates, where a fast gesture turns far in a frame, the last number of degrees suffices.
 FLIP_DEGREES, FLIP_SPEED, FLIP_SURELY = 60.0, 1800.0, 150.0
-#: A flip is so many times the steps around it (but for one, the way back); fast gestures gain speed over frames.
+#: Ratio of a flip to the steps around it (except one, the way back); fast gestures gain speed over frames.
 FLIP_ISOLATION = 4.0
-#: Metres between frames, and times the steps around, that make a jump of the root.
+#: Metres between frames, and ratio to the steps around, of a jump of the root.
 JUMP_METRES, JUMP_ISOLATION = 0.15, 4.0
-#: Share of frames equal to the one before from which a motion looks upsampled by repetition.
+#: Share of frames equal to the one before from which a motion counts as upsampled by repetition.
 REPEATED_SHARE = 0.2
 _BESIDE = 3
 
@@ -38,10 +38,11 @@ def rotation_steps(motion: Motion) -> Float[np.ndarray, "S J"]:
 
 
 def check_frozen(motion: Motion, rig: Rig | None = None) -> list[Finding]:
-    """Joints that do not turn at all, for a stretch or throughout, while others do.
+    """Findings on joints that do not turn at all, for a stretch or throughout, while others do.
 
-    A warning where a living body cannot: an elbow, a wrist, a shoulder, the whole trunk, or head and neck together.
-    Legs, fingers and helpers that never turn are an info, since many data sets leave them still.
+    A warning where that is impossible for a living body: an elbow, a wrist, a shoulder, the whole trunk, or head
+    and neck together. Legs, fingers and helpers that never turn are an info, since many data sets keep them
+    still.
     """
     if motion.frames < 2:
         return []
@@ -49,7 +50,7 @@ def check_frozen(motion: Motion, rig: Rig | None = None) -> list[Finding]:
     if still.all():
         return [Finding("warning", "frozen", "nothing moves.", "Export the take again.", Place(frame=0, seconds=0.0))]
     names, findings = motion.skeleton.names, []
-    told: set[int] = set()
+    reported: set[int] = set()
     for label, joints in _vital_parts(rig):
         for start, stop in _runs(np.all(still[:, joints], axis=1), FROZEN_SECONDS * motion.fps):
             others = np.ones(motion.skeleton.joints, bool)
@@ -57,18 +58,18 @@ def check_frozen(motion: Motion, rig: Rig | None = None) -> list[Finding]:
             if _most_turned(motion, start, stop, others) < MOVES_MEANWHILE:
                 continue
             seconds = (stop - start) / motion.fps
-            told.update(joints)
+            reported.update(joints)
             findings.append(
                 Finding(
                     "warning",
                     "frozen",
                     f"{label} does not turn at all for {seconds:.1f} s while other joints move.",
-                    "Was the marker lost, or the joint left out of the export? Mend it or cut the stretch out.",
+                    "Was the marker lost, or the joint left out of the export? Fix it or cut the stretch out.",
                     Place(joint=names[joints[-1]], frame=start, seconds=start / motion.fps),
                     seconds,
                 )
             )
-    static = [names[joint] for joint in np.flatnonzero(still.all(axis=0)) if joint not in told]
+    static = [names[joint] for joint in np.flatnonzero(still.all(axis=0)) if joint not in reported]
     if static:
         message = f"{len(static)} of {len(names)} joints never turn: {_some(static)}."
         findings.append(Finding("info", "static", message, value=float(len(static))))
@@ -76,7 +77,7 @@ def check_frozen(motion: Motion, rig: Rig | None = None) -> list[Finding]:
 
 
 def _vital_parts(rig: Rig | None) -> list[tuple[str, list[int]]]:
-    """What of a living body always moves a little; the parts of a trunk may share one joint's motion."""
+    """Parts that always move a little in a living body; those of a trunk may share one joint's motion."""
     if rig is None:
         return []
     roles = rig.roles
@@ -93,15 +94,15 @@ def _most_turned(motion: Motion, start: int, stop: int, joints: Bool[np.ndarray,
 
 
 def _runs(mask: Bool[np.ndarray, " N"], shortest: float) -> list[tuple[int, int]]:
-    """Stretches (start, stop) of true values, at least so long."""
+    """Stretches (start, stop) of true values with a minimum length."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= shortest]
 
 
 def check_flips(motion: Motion) -> list[Finding]:
-    """Rotations that jump between two frames and not around them, as swapped markers and wrong Euler angles do.
+    """Findings on rotations that jump between two frames and not around them: swapped markers, wrong Euler angles.
 
-    Angles that run from 179 to -179 degrees are the same rotation and are not seen here; see
+    Angles that run from 179 to -179 degrees are the same rotation and not found here; see
     :func:`a2g_jax.inspection.bvh_file.check_wraps`.
     """
     if motion.frames < 2 * _BESIDE:
@@ -128,7 +129,7 @@ def check_flips(motion: Motion) -> list[Finding]:
 
 
 def check_jumps(motion: Motion) -> list[Finding]:
-    """Places where the whole body leaps between two frames, as cuts and lost tracking do."""
+    """Findings on jumps of the root between two frames, as by cuts and lost tracking."""
     if motion.frames < 2 * _BESIDE:
         return []
     steps = np.linalg.norm(np.diff(np.asarray(motion.root, np.float64), axis=0), axis=1)[:, None]
@@ -136,8 +137,8 @@ def check_jumps(motion: Motion) -> list[Finding]:
     if len(frames) == 0:
         return []
     worst = int(frames[np.argmax(steps[frames, 0])])
-    message = f"the root leaps by {steps[worst, 0]:.2f} m from this frame to the next"
-    message += f" ({len(frames)} such leaps)." if len(frames) > 1 else "."
+    message = f"the root jumps by {steps[worst, 0]:.2f} m from this frame to the next"
+    message += f" ({len(frames)} such jumps)." if len(frames) > 1 else "."
     place = Place(joint=motion.skeleton.names[0], frame=worst, seconds=worst / motion.fps)
     return [
         Finding("warning", "jump", message, "Is it two takes in one file? Split it.", place, float(steps[worst, 0]))
@@ -145,7 +146,7 @@ def check_jumps(motion: Motion) -> list[Finding]:
 
 
 def check_repeats(motion: Motion) -> list[Finding]:
-    """Frames that repeat the one before: a motion brought to a higher rate without interpolation."""
+    """Findings on frames that repeat the one before: a motion brought to a higher rate without interpolation."""
     if motion.frames < 10:
         return []
     still = np.all(rotation_steps(motion) < STILL, axis=1)
@@ -155,20 +156,20 @@ def check_repeats(motion: Motion) -> list[Finding]:
     if share < REPEATED_SHARE or still.all() or alone.sum() < 0.1 * len(still):
         return []
     message = f"{100 * share:.0f} % of the frames repeat the one before."
-    mend = f"The motion was recorded at about {motion.fps * (1 - share):.3g} fps; export it at that rate."
-    return [Finding("warning", "repeated", message, mend, value=share)]
+    fix = f"The motion was recorded at about {motion.fps * (1 - share):.3g} fps; export it at that rate."
+    return [Finding("warning", "repeated", message, fix, value=share)]
 
 
 def check_finite(values: Float[np.ndarray, "..."], what: str) -> list[Finding]:
-    """NaN and infinities in an array."""
+    """Findings on NaN and infinities in an array."""
     bad = ~np.isfinite(values)
     count = int(bad.sum())
     if count == 0:
         return []
     first = ", ".join(str(int(index)) for index in np.argwhere(bad)[0])
     message = f"{what} holds {count} values that are NaN or infinite, the first at [{first}]."
-    mend = "Find what wrote it; a network trained on it becomes NaN."
-    return [Finding("warning", "nan", message, mend, value=float(count))]
+    fix = "Fix the program that wrote it; a network trained on it becomes NaN."
+    return [Finding("warning", "nan", message, fix, value=float(count))]
 
 
 def check_motion(motion: Motion, rig: Rig | None = None) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""What an inspection says, as one JSON document and as text."""
+"""The report of an inspection, as one JSON document and as text."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,38 +6,38 @@ from typing import Any
 
 from a2g_jax.inspection.finding import Finding, warnings_of
 
-FORMAT, VERSION = "a2g_jax inspection", 1
-#: Findings of one code that text shows in full; JSON has them all.
+FORMAT, VERSION = "a2g_jax inspection", 2
+#: Findings of one code shown as text; JSON has all.
 _SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """One inspected thing.
+    """Facts and findings of a file, folder, corpus or run.
 
     As JSON, stable within a version::
 
-        {"format": "a2g_jax inspection", "version": 1,
+        {"format": "a2g_jax inspection", "version": 2,
          "path": ..., "kind": "bvh" | "audio" | "transcript" | "motion npz" | "smplx npz" | "npz" | "pair" | "folder"
-                              | "corpus" | "run" | "score",
+                              | "corpus" | "run" | "likelihood",
          "facts": {section: {name: number, text, list or further names}},
-         "findings": [{"severity": "warning" | "info", "code", "message", "mend", "value": number or null,
+         "findings": [{"severity": "warning" | "info", "code", "message", "fix", "value": number or null,
                        "place": {"path", "recording", "joint", "frame", "seconds"} as far as they apply}]}
     """
 
     path: str
     kind: str
     facts: dict[str, Any]
-    """Sections of numbers, texts and lists; a section ``skeleton`` holds what :mod:`a2g_jax.inspection.tree` draws."""
+    """Sections of numbers, texts and lists; the section ``skeleton`` is drawn by :mod:`a2g_jax.inspection.tree`."""
     findings: list[Finding] = field(default_factory=list)
 
     @property
     def warnings(self) -> int:
-        """How many warnings there are."""
+        """Number of warnings."""
         return len(warnings_of(self.findings))
 
     def to_json(self) -> dict[str, Any]:
-        """The document."""
+        """The JSON document."""
         document = {
             "format": FORMAT,
             "version": VERSION,
@@ -49,7 +49,7 @@ class Report:
         return _without_nan(document)
 
     def text(self) -> str:
-        """For a terminal."""
+        """The report for a terminal."""
         from a2g_jax.inspection.tree import draw_tree
 
         lines = [f"{self.path}: {self.kind}"]
@@ -70,7 +70,7 @@ class Report:
             for code in dict.fromkeys(finding.code for finding in chosen):
                 groups: dict[tuple[str, str], list[Finding]] = {}
                 for finding in (finding for finding in chosen if finding.code == code):
-                    groups.setdefault((finding.message, finding.mend), []).append(finding)
+                    groups.setdefault((finding.message, finding.fix), []).append(finding)
                 same = [
                     first.line() + (f" (The same in {len(more)} more places.)" if more else "")
                     for first, *more in groups.values()
@@ -82,7 +82,7 @@ class Report:
 
 
 def _without_nan(value: Any) -> Any:
-    """JSON knows no NaN and no infinity: null."""
+    """The value with null for NaN and infinity, which JSON lacks."""
     if isinstance(value, dict):
         return {name: _without_nan(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple):

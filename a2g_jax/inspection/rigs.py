@@ -1,4 +1,4 @@
-"""Skeletons of several recordings against each other: other joints, other bones, other rest poses."""
+"""Comparison of the skeletons of several recordings: joints, bones, rest poses."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from a2g_jax.inspection.finding import Finding, Place
 
 #: Degrees between directions of a bone at rest: exporters round, and calibration moves a bone by a few degrees.
 REST_ANGLE = 15.0
-#: Ratio of the size of a skeleton to the usual one beyond which another unit is likelier than another person.
+#: Ratio of the sizes of a skeleton and the median one from which another unit is likelier than another person.
 OTHER_UNIT = 1.6
 #: Share by which the bones of one person may differ between takes.
 SAME_BONES = 0.02
@@ -22,11 +22,11 @@ _SHORT = 0.01
 def check_skeletons(
     skeletons: Sequence[Skeleton], names: Sequence[str], speakers: Sequence[str] | None = None
 ) -> list[Finding]:
-    """What differs among the skeletons of recordings that are meant to be trained on together.
+    """Findings on differences between the skeletons of recordings for one training.
 
     Args:
-        names: of the recordings.
-        speakers: who moves in each, empty where unknown; bones may differ between people.
+        names: names of the recordings.
+        speakers: speaker of each, empty where unknown; bones may differ between people.
     """
     if len(skeletons) < 2:
         return []
@@ -36,8 +36,8 @@ def check_skeletons(
     for one, name in zip(skeletons, names, strict=True):
         if (one.names, one.parents) != usual:
             message = f"has other joints than {count} of the {len(skeletons)} recordings{_difference(one, usual[0])}."
-            mend = "Retarget it, or prepare the 22 body joints only."
-            findings.append(Finding("warning", "skeleton", message, mend, Place(recording=name)))
+            fix = "Retarget it, or prepare the 22 body joints only."
+            findings.append(Finding("warning", "skeleton", message, fix, Place(recording=name)))
     alike = [at for at, one in enumerate(skeletons) if (one.names, one.parents) == usual]
     sizes = [float(np.linalg.norm(np.asarray(skeletons[at].offsets)[1:], axis=1).sum()) for at in alike]
     for at, size in zip(list(alike), sizes, strict=True):
@@ -45,8 +45,8 @@ def check_skeletons(
         if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
             alike.remove(at)
             message = f"is {ratio:.3g} times as large as the usual skeleton here."
-            mend = "Is it in another unit? Say which when you read it (read_bvh's scale)."
-            findings.append(Finding("warning", "unit", message, mend, Place(recording=names[at]), ratio))
+            fix = "If it is in another unit, name it when reading (scale of read_bvh)."
+            findings.append(Finding("warning", "unit", message, fix, Place(recording=names[at]), ratio))
     return findings + _offsets(
         [skeletons[at] for at in alike],
         [names[at] for at in alike],
@@ -82,9 +82,9 @@ def _offsets(skeletons: Sequence[Skeleton], names: Sequence[str], speakers: Sequ
                 f"its rest pose differs: {int((angles > REST_ANGLE).sum())} bones point elsewhere than in most "
                 f"recordings here, {joints[worst]} by {angles[worst]:.0f} degrees."
             )
-            mend = "Retarget it to the usual skeleton; equal rotations mean other poses on it."
+            fix = "Retarget it to the usual skeleton; equal rotations mean other poses on it."
             place = Place(recording=name, joint=joints[worst])
-            findings.append(Finding("warning", "rest-pose", message, mend, place, float(angles[worst])))
+            findings.append(Finding("warning", "rest-pose", message, fix, place, float(angles[worst])))
     return findings + _bones(lengths, names, speakers, joints, long)
 
 
@@ -100,8 +100,8 @@ def _bones(lengths, names: Sequence[str], speakers: Sequence[str], joints: Seque
             worst = int(np.argmax(np.where(long, np.abs(lengths[row] / np.maximum(usual, 1e-9) - 1), 0.0)))
             share = float(lengths[row, worst] / usual[worst])
             message = f"bones are not those of {speaker}'s other recordings: {joints[worst]} {share:.2f} times as long."
-            mend = "Was the person calibrated anew, or is the speaker another?"
-            findings.append(Finding("warning", "bones", message, mend, Place(recording=names[row]), share))
+            fix = "Check the calibration and the name of the speaker."
+            findings.append(Finding("warning", "bones", message, fix, Place(recording=names[row]), share))
     if spread > SAME_BONES and not findings and not any(speakers):
         message = f"bones differ by up to {100 * spread:.0f} % between the recordings, as between people."
         findings.append(Finding("info", "bones", message, value=spread))

@@ -1,4 +1,4 @@
-"""Inspecting a run made by ``a2g train``."""
+"""Inspection of a run made by ``a2g train``."""
 
 import json
 import os
@@ -11,12 +11,12 @@ from flax.traverse_util import flatten_dict
 
 from a2g_jax.inspection.finding import Finding
 from a2g_jax.inspection.report import Report
-from a2g_jax.inspection.tree import skeleton_facts
+from a2g_jax.inspection.tree import body_facts
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import SHIPPED
 
 _METRICS = "metrics.jsonl"
-#: Times the best validation loss from which the last one has got worse and not merely fluctuates.
+#: Ratio of the last to the best validation loss from which the difference is no fluctuation.
 _WORSE = 1.25
 
 
@@ -35,29 +35,29 @@ def inspect_run(name: str | os.PathLike[str]) -> Report:
 
 
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
-    """Training that has not ended, losses that are no numbers, validation that got worse."""
+    """Findings on unfinished training, losses that are not numbers, and rising validation loss."""
     findings = []
-    asked = run.config.train_config.steps
-    if run.steps < asked:
-        message = f"{run.steps} of {asked} steps are done."
+    wanted = run.config.train_config.steps
+    if run.steps < wanted:
+        message = f"{run.steps} of {wanted} steps are done."
         findings.append(
-            Finding("info", "unfinished", message, "'a2g train ... --resume' goes on.", value=run.steps / asked)
+            Finding("info", "unfinished", message, "Continue with 'a2g train ... --resume'.", value=run.steps / wanted)
         )
     losses = [line.get("loss") for line in log if "loss" in line]
     if None in losses:
-        message = f"{losses.count(None)} logged losses are no numbers."
+        message = f"{losses.count(None)} logged losses are not numbers."
         findings.append(Finding("warning", "nan", message, "Lower the learning rate, or inspect the corpus."))
     checked = [line["loss"] for line in log if line.get("split") == "validation" and line.get("loss") is not None]
     # Losses below zero, as of likelihoods, have no ratio.
     if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
         message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
-        mend = "It learns its corpus by heart: train on more recordings, or for fewer steps."
-        findings.append(Finding("info", "overfitting", message, mend, value=checked[-1] / min(checked)))
+        fix = "It overfits: train on more recordings, or for fewer steps."
+        findings.append(Finding("info", "overfitting", message, fix, value=checked[-1] / min(checked)))
     return findings
 
 
 def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
-    """What a run is."""
+    """The facts of a run."""
     config = run.config
     sizes = {name: int(np.size(value)) for name, value in flatten_dict(run.params, sep="/").items()}
     parts: dict[str, int] = {}
@@ -71,6 +71,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
             "parameters": sum(sizes.values()),
             "of which": parts,
             "fps": config.fps,
+            "pose": f"{config.space.kind}, {config.space.rows} rows",
             "audio": f"{config.mel.width} values a frame at {config.mel.sample_rate} Hz",
         },
         "corpus": {
@@ -90,8 +91,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
         facts["last losses"] = {
             split: {name: value for name, value in line.items() if name != "split"} for split, line in last.items()
         }
-    facts["skeleton"] = skeleton_facts(config.skeleton)
-    return facts
+    return facts | body_facts(config.space.body)
 
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _metrics(path: Path) -> list[dict[str, Any]]:
-    """Lines of the log; what a kill cut short is left out."""
+    """Lines of the log, without a last line that was cut short."""
     lines: list[dict[str, Any]] = []
     if not path.is_file():
         return lines

@@ -1,11 +1,10 @@
-"""Do motion and audio last equally long, and do they start together?
+"""Do motion and audio have the same length, and do they start together?
 
-The offset is measured where speech starts a syllable and hands speed up: the rise of the speech's energy is correlated
-with the square root of the wrists' speed, both between 0.3 and 4 Hz, over all circular shifts. A relation of motion to
-speech makes a peak at the true offset. How high a peak is by chance, the shifts beyond any plausible offset say: they
-are the null. On 18 generated recordings of 64 s the peak stood 4 to 9 of its standard deviations out, at -0.06 s with a
-spread of 0.01 s; on a ZeroEGGS take 6.5 at 0.02 s; on a BEAT take of 15 fps it did not stand out (2.9), and nothing is
-said.
+The offset is that of the starts of syllables and the acceleration of the hands: the rise of the speech's energy is
+correlated with the square root of the wrists' speed, both between 0.3 and 4 Hz, over all circular shifts. If motion is
+related to speech, there is a peak at the true offset. Shifts beyond any plausible offset are the null. On 18 generated
+recordings of 64 s the peak stood 4 to 9 of its standard deviations out, at -0.06 s with a spread of 0.01 s; on a
+ZeroEGGS take 6.5 at 0.02 s; on a BEAT take of 15 fps it did not stand out (2.9), and nothing is reported.
 """
 
 from dataclasses import dataclass
@@ -19,21 +18,21 @@ from a2g_jax.geometry.retarget.poses import joint_places, world_rotations
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.finding import Finding, Place
 
-#: Rate at which both are compared, Hz.
+#: Sampling rate of the comparison, Hz.
 RATE = 50.0
-#: Standard deviations of the null that a peak must stand out by. The largest of the about 160 independent shifts that
-#: are searched stands out by 3 by chance, and by 5 once in 20000 recordings.
+#: Height of a significant peak in standard deviations of the null. By chance the largest of the about 160 independent
+#: shifts that are searched is at 3, and at 5 once in 20000 recordings.
 SIGNIFICANT = 5.0
-#: By how many it must be higher than any shift that counts as none.
+#: Least height above any shift within tolerance, in the same unit.
 CLEARER = 2.5
-#: Seconds by which hands lead on sound recordings, and how far from that no listener notices: lip-sync standards allow
-#: 0.1 s, and gestures lead their words by up to 0.2 s.
+#: Offset of correct recordings in seconds (hands lead), and its tolerance: lip-sync standards allow 0.1 s, and gestures
+#: lead their words by up to 0.2 s.
 USUAL, TOLERATED = -0.03, 0.2
-#: Longest offset that is looked for, and shortest recording in which one can be told from chance, seconds.
+#: Longest offset that is searched, and shortest recording in which one can be significant, seconds.
 LONGEST, SHORTEST = 10.0, 20.0
-#: Lengths may differ by so many seconds and by this share: recorders stop at different times.
+#: Tolerance of lengths in seconds and as a share: recorders stop at different times.
 SPARE_SECONDS, SPARE_SHARE = 0.5, 0.01
-#: A wrong rate explains a difference in length if what remains is below this share, or below so many frames.
+#: A wrong frame rate explains a difference in length if the rest is below this share, or below this number of frames.
 RATE_FITS, FRAMES_FIT = 0.02, 1.5
 _RATES = (15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
 _BROADCAST = tuple(rate * 1000 / 1001 for rate in (24.0, 30.0, 60.0, 120.0))
@@ -41,32 +40,32 @@ _BROADCAST = tuple(rate * 1000 / 1001 for rate in (24.0, 30.0, 60.0, 120.0))
 
 @dataclass(frozen=True)
 class Offset:
-    """How late the motion is against the audio, and how sure that is."""
+    """Delay of the motion relative to the audio, with its significance."""
 
     seconds: float
     """Positive where the motion is late."""
     deviations: float
     """Height of the peak over the null's mean, in standard deviations of the null."""
     clearer: float
-    """The same over the highest value among the shifts that count as none."""
+    """The same over the highest value among the shifts within tolerance."""
 
     @property
-    def known(self) -> bool:
-        """Whether motion and audio are related so clearly that the offset means something."""
+    def significant(self) -> bool:
+        """Whether motion and audio are related clearly enough for an offset."""
         return self.deviations >= SIGNIFICANT
 
     @property
     def wrong(self) -> bool:
-        """Whether they do not start together."""
-        return self.known and abs(self.seconds - USUAL) > TOLERATED and self.clearer >= CLEARER
+        """Whether motion and audio do not start together."""
+        return self.significant and abs(self.seconds - USUAL) > TOLERATED and self.clearer >= CLEARER
 
 
 def check_lengths(frames: int, fps: float, audio_seconds: float) -> list[Finding]:
-    """Length of the motion against that of the audio; names the frame time that would fit, if one does."""
+    """Findings on different lengths of motion and audio, with the frame time that would fit, if one does."""
     seconds = frames / fps
     gap = seconds - audio_seconds
     rate = _fitting_rate(frames, fps, audio_seconds)
-    # A rate that fits to a frame says more than the spare time that recorders need: 29.97 fps read as 30.
+    # A rate that fits within a frame outweighs the tolerance: 29.97 fps read as 30.
     exact = rate is not None and abs(frames / rate - audio_seconds) * fps <= FRAMES_FIT
     spare = max(SPARE_SECONDS, SPARE_SHARE * audio_seconds)
     if abs(gap) <= (SPARE_SECONDS if exact else spare):
@@ -92,16 +91,16 @@ def _fitting_rate(frames: int, fps: float, audio_seconds: float) -> float | None
 
 
 def check_offset(offset: Offset | None) -> list[Finding]:
-    """What a measured offset means."""
+    """Findings on a measured offset."""
     if offset is None or not offset.wrong:
         return []
     shift = offset.seconds - USUAL
     message = (
-        f"the hands move {abs(shift):.2f} s {'after' if shift > 0 else 'before'} the speech they go with "
+        f"the hands move {abs(shift):.2f} s {'after' if shift > 0 else 'before'} the speech "
         f"({offset.deviations:.1f} standard deviations above chance)."
     )
-    mend = f"Cut {abs(shift):.2f} s from the start of the {'motion' if shift > 0 else 'audio'}."
-    return [Finding("warning", "offset", message, mend, Place(seconds=0.0), shift)]
+    fix = f"Cut {abs(shift):.2f} s from the start of the {'motion' if shift > 0 else 'audio'}."
+    return [Finding("warning", "offset", message, fix, Place(seconds=0.0), shift)]
 
 
 def energy_db(audio: Float[np.ndarray, " N"], sample_rate: int, seconds: float) -> Float[np.ndarray, " K"]:
@@ -110,21 +109,21 @@ def energy_db(audio: Float[np.ndarray, " N"], sample_rate: int, seconds: float) 
     count = max(1, len(audio) // block)
     power = np.square(audio[: count * block].reshape(count, -1), dtype=np.float64).mean(axis=1)
     smooth = ndimage.gaussian_filter1d(power, 0.02 * sample_rate / block, mode="constant")
-    # Of the blocks, whose middles lie half a block after their starts.
+    # Indices of blocks, whose centres lie half a block after their starts.
     where = np.arange(int(seconds * RATE)) * sample_rate / RATE / block - 0.5
     return 10 * np.log10(smooth[np.clip(np.rint(where).astype(int), 0, count - 1)] + 1e-12)
 
 
-def wrist_places(motion: Motion, rig: Rig) -> Float[np.ndarray, "T 2 3"]:
-    """Both wrists, relative to the chest's place, metres."""
+def wrist_positions(motion: Motion, rig: Rig) -> Float[np.ndarray, "T 2 3"]:
+    """Positions of both wrists relative to the chest, metres."""
     world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
-    places = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
-    wrists = places[:, [rig.roles["L_Wrist"], rig.roles["R_Wrist"]]]
-    return (wrists - places[:, [rig.roles["Chest"]]]).astype(np.float64)
+    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
+    wrists = positions[:, [rig.roles["L_Wrist"], rig.roles["R_Wrist"]]]
+    return (wrists - positions[:, [rig.roles["Chest"]]]).astype(np.float64)
 
 
 def at_rate(values: Float[np.ndarray, "T *d"], fps: float) -> Float[np.ndarray, "K *d"]:
-    """Values of frames at ``k / fps`` brought to :data:`RATE`, linearly."""
+    """Values of frames at ``k / fps`` resampled linearly to :data:`RATE`."""
     count = int(len(values) / fps * RATE)
     where = np.minimum(np.arange(count) * fps / RATE, len(values) - 1)
     low = np.minimum(where.astype(int), max(len(values) - 2, 0))
@@ -133,11 +132,11 @@ def at_rate(values: Float[np.ndarray, "T *d"], fps: float) -> Float[np.ndarray, 
 
 
 def measure_offset(energy: Float[np.ndarray, " K"], wrists: Float[np.ndarray, "M 2 3"]) -> Offset | None:
-    """How late hands are against speech; None for recordings too short, or without speech or motion.
+    """Delay of the hands relative to speech; None for short recordings and those without speech or motion.
 
     Args:
-        energy: of speech in dB, at :data:`RATE`.
-        wrists: their places at :data:`RATE`, metres.
+        energy: energy of speech at :data:`RATE`, dB.
+        wrists: positions of the wrists at :data:`RATE`, metres.
     """
     count = min(len(energy), len(wrists))
     if count < SHORTEST * RATE:
@@ -147,10 +146,11 @@ def measure_offset(energy: Float[np.ndarray, " K"], wrists: Float[np.ndarray, "M
     velocity = np.gradient(ndimage.gaussian_filter1d(wrists[:count], 0.06 * RATE, axis=0), axis=0)
     speed = np.sqrt(np.linalg.norm(velocity, axis=-1).sum(axis=-1))
     band = signal.butter(2, [0.3, 4.0], "band", fs=RATE, output="sos")
-    heard, seen = signal.sosfiltfilt(band, rises), signal.sosfiltfilt(band, speed)
-    if heard.std() < 1e-9 or seen.std() < 1e-9:
+    audio_signal, motion_signal = signal.sosfiltfilt(band, rises), signal.sosfiltfilt(band, speed)
+    if audio_signal.std() < 1e-9 or motion_signal.std() < 1e-9:
         return None
-    spectrum = np.fft.rfft(seen / seen.std()) * np.conj(np.fft.rfft(heard / heard.std()))
+    audio_signal, motion_signal = audio_signal / audio_signal.std(), motion_signal / motion_signal.std()
+    spectrum = np.fft.rfft(motion_signal) * np.conj(np.fft.rfft(audio_signal))
     correlation = np.fft.irfft(spectrum, count) / count
     lags = (np.arange(count) - count * (np.arange(count) > count // 2)) / RATE
     longest = min(LONGEST, count / RATE / 6)

@@ -1,15 +1,16 @@
-"""A skeleton as a drawn tree."""
+"""The body of a motion: a skeleton, as a drawn tree, or points and bones."""
 
 from typing import Any
 
 import numpy as np
 
+from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.geometry.skeleton import Skeleton
 
 
 def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]:
-    """Joints with parents, bone lengths in centimetres and the parts of a body that were found."""
+    """Joints with parents, bone lengths in centimetres and the parts of a body."""
     part_of: dict[int, str] = {}
     facts: dict[str, Any] = {"count": skeleton.joints}
     if rig is not None:
@@ -29,8 +30,21 @@ def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]
     return facts
 
 
+def body_facts(body: Skeleton | PoseLayout, rig: Rig | None = None) -> dict[str, Any]:
+    """The section of a report on the body: ``skeleton``, or ``points`` where poses are keypoints or directions."""
+    if isinstance(body, Skeleton):
+        return {"skeleton": skeleton_facts(body, rig)}
+    points: dict[str, Any] = {
+        "names": list(body.names),
+        "bones": [f"{body.names[start]}-{body.names[end]}" for start, end in body.bones],
+    }
+    if body.lengths:
+        points["bone lengths (cm)"] = [round(100 * length, 2) for length in body.lengths]
+    return {"points": points}
+
+
 def draw_tree(facts: dict[str, Any]) -> list[str]:
-    """One line a joint: the branch, the name, the length of its bone, the part of the body."""
+    """One line per joint: branch, name, bone length, part of the body."""
     joints = facts["joints"]
     children: dict[int, list[int]] = {}
     for joint, entry in enumerate(joints):

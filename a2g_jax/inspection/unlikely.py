@@ -1,4 +1,4 @@
-"""The moments of a motion that a model finds least likely."""
+"""The least likely moments of a motion."""
 
 from dataclasses import dataclass
 
@@ -7,31 +7,31 @@ from jaxtyping import Float
 
 from a2g_jax.geometry.motion import Motion
 
-#: Seconds that two moments are apart at the least, and how many are told of.
+#: Least distance of two moments in seconds, and most moments in a report.
 APART, MOST = 0.5, 8
 #: A normal distribution's standard deviation over its median absolute deviation.
 _ROBUST = 1.4826
-#: Joints whose acceleration changes by this share of the largest change are named with it, up to so many.
+#: A moment names up to three joints whose change of acceleration is at least this share of the largest.
 _SHARE, _NAMED = 0.5, 3
 
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame less likely than all near it."""
+    """A frame that is less likely than its neighbourhood."""
 
     frame: int
-    """Of the motion."""
+    """Frame of the motion."""
     seconds: float
     log_likelihood: float
-    """Nats."""
+    """Log-likelihood of the frame, nats."""
     deviations: float
     """Robust standard deviations below the motion's median."""
     joints: tuple[str, ...]
-    """Whose acceleration changed most there."""
+    """Joints with the largest change of acceleration, the largest first."""
 
 
 def robust_scale(values: Float[np.ndarray, " N"]) -> tuple[float, float]:
-    """Median, and the standard deviation that the median absolute deviation tells of."""
+    """Median, and the standard deviation estimated from the median absolute deviation."""
     median = float(np.median(values))
     return median, _ROBUST * float(np.median(np.abs(values - median)))
 
@@ -42,9 +42,10 @@ def unlikely_moments(
     """The least likely frames, the least likely first, no two within :data:`APART` seconds.
 
     Args:
-        log_likelihood: of the frames from ``first`` on.
-        motion: on the run's skeleton, at its frame rate.
-        most: how many.
+        log_likelihood: values of the frames from ``first`` on.
+        first: frame of the first value.
+        motion: the motion, on the run's skeleton and at its frame rate.
+        most: limit of moments.
     """
     median, scale = robust_scale(log_likelihood)
     left = log_likelihood.astype(np.float64)
@@ -62,7 +63,7 @@ def unlikely_moments(
 
 
 def acceleration_changes(motion: Motion) -> Float[np.ndarray, "T J"]:
-    """Size of the third difference of each joint's rotation matrix that ends at a frame; zero for the first three."""
+    """Norm of the third difference of each joint's rotation matrix ending at a frame; zero for the first three."""
     rotations = np.asarray(motion.rotations, np.float32)
     sizes = np.zeros(rotations.shape[:2], np.float32)
     if motion.frames > 3:
@@ -71,7 +72,7 @@ def acceleration_changes(motion: Motion) -> Float[np.ndarray, "T J"]:
 
 
 def _oddest(motion: Motion, changes: Float[np.ndarray, "T J"], frame: int) -> tuple[str, ...]:
-    # What one odd frame disturbs: differences that end at it or at the two after it have it with a weight of 1, 3, 3.
+    # Third differences that end at a frame or at the two after it contain it with weights of 1, 3 and 3.
     here = changes[frame : frame + 3].max(axis=0)
     order = np.argsort(-here, kind="stable")[:_NAMED]
     return tuple(motion.skeleton.names[joint] for joint in order if here[joint] > max(_SHARE * here[order[0]], 1e-6))

@@ -1,4 +1,4 @@
-"""Beat alignment in its two published forms. It has no zero: print it beside its null (:func:`with_null`)."""
+"""Beat alignment in its two published forms. It has no zero: report it with its null (:func:`with_null`)."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from scipy import ndimage, signal
 
 Times = Float[np.ndarray, " _"]
 
-#: Standard deviations of the papers: the flow's in frames, BEAT's in seconds.
+#: Standard deviations in the papers: of the flow in frames, of BEAT in seconds.
 FLOW_SIGMA_FRAMES, BEAT_SIGMA = 5.0, 0.1
 
 
 def motion_beats(positions: Float[np.ndarray, "T J D"], fps: float, smoothing: float = 0.0) -> Times:
-    """Seconds at which the summed speed of all joints has a local minimum (Li et al. 2021, "AI Choreographer").
+    """Times (s) at which the summed speed of all joints has a local minimum (Li et al. 2021, "AI Choreographer").
 
     Args:
         smoothing: standard deviation in seconds of a Gaussian over the speed; the authors' code has 5 frames at 60 fps.
@@ -22,17 +22,17 @@ def motion_beats(positions: Float[np.ndarray, "T J D"], fps: float, smoothing: f
     speed = np.linalg.norm(np.diff(positions, axis=0), axis=-1).sum(axis=-1) * fps
     if smoothing > 0:
         speed = ndimage.gaussian_filter1d(speed, smoothing * fps)
-    # Speed k is that between frames k and k + 1.
+    # Speed k is between frames k and k + 1.
     return (signal.find_peaks(-speed)[0] + 0.5) / fps
 
 
 def audio_onsets(audio: Float[np.ndarray, " N"], sample_rate: int) -> Times:
-    """Seconds of the onsets that librosa detects, at the audio's own rate.
+    """Times of the onsets that librosa detects at the audio's own rate, seconds.
 
-    Public code that hands 16 kHz audio on without its rate has librosa take it for 22.05 kHz, and scores a click at
-    57.0 s as one at 41.3 s.
+    Public code that passes 16 kHz audio without its rate makes librosa assume 22.05 kHz: a click at 57.0 s counts as
+    one at 41.3 s.
     """
-    import librosa  # late: it costs seconds
+    import librosa  # here, since it takes seconds
 
     return np.asarray(librosa.onset.onset_detect(y=np.asarray(audio), sr=sample_rate, units="time"), np.float64)
 
@@ -54,7 +54,7 @@ def beat_alignment(of: Times, to: Times, sigma: float) -> float:
 
 
 class WithNull(NamedTuple):
-    """A score beside what it is when motion and audio are shifted against each other."""
+    """A score with its null: the same for motion shifted relative to the audio."""
 
     value: float
     null_mean: float
@@ -73,12 +73,12 @@ def with_null(
     seconds: float,
     shifts: Float[np.ndarray, " k"] | None = None,
 ) -> WithNull:
-    """A score of (motion beats, audio onsets), and the same with the motion's beats moved round in a circle.
+    """A score of (motion beats, audio onsets), and its null over circular shifts of the motion beats.
 
     Args:
-        score: such as ``lambda m, a: beat_alignment(m, a, 5 / 30)``.
-        seconds: length of the circle.
-        shifts: seconds; by default 34 from 1 to 5 s either way.
+        score: a function such as ``lambda m, a: beat_alignment(m, a, 5 / 30)``.
+        seconds: length of the recording.
+        shifts: seconds; by default 34 from 1 to 5 s in either direction.
     """
     if shifts is None:
         shifts = np.concatenate([np.linspace(-5.0, -1.0, 17), np.linspace(1.0, 5.0, 17)])
@@ -87,9 +87,9 @@ def with_null(
 
 
 def mel_onsets(log_mel: Float[np.ndarray, "T bands"], fps: float) -> Times:
-    """Seconds of onsets in log-mel rows: peaks of the mean rise over bands that stand out by half its deviation.
+    """Times (s) of onsets in log-mel rows: peaks, prominent by half a standard deviation, of the mean rise over bands.
 
-    For corpora that keep no waveform; as exact as a row is long.
+    For corpora without a waveform; the resolution is one row.
     """
     rise = np.maximum(np.diff(np.asarray(log_mel, np.float64), axis=0, prepend=log_mel[:1]), 0.0).mean(axis=1)
     peaks, _ = signal.find_peaks(rise, prominence=max(0.5 * float(rise.std()), 1e-9))

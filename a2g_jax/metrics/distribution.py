@@ -9,7 +9,7 @@ Features = Float[np.ndarray, "_ F"]
 
 
 class FrechetDistance(NamedTuple):
-    """A Fréchet distance with the numbers of samples that it is of: it falls as they grow, for equal distributions."""
+    """A Fréchet distance with its numbers of samples: for equal distributions it falls as they grow."""
 
     value: float
     samples: int
@@ -17,7 +17,7 @@ class FrechetDistance(NamedTuple):
 
 
 def frechet_distance(features: Features, reference: Features) -> FrechetDistance:
-    """Fréchet distance of the Gaussians through two sets of features (Audio2Gestures, extended, Eq. 25).
+    """Fréchet distance of the Gaussians fitted to two sets of features (Audio2Gestures, extended, Eq. 25).
 
     NaN where a feature is NaN.
 
@@ -39,8 +39,8 @@ def gaussian_distance(
 ) -> float:
     """``|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2))`` in float64.
 
-    The trace of the root is the sum of the singular values of ``C1^(1/2) C2^(1/2)``, so that no complex root of a
-    product that is only nearly positive can come up.
+    The trace of the root is the sum of the singular values of ``C1^(1/2) C2^(1/2)``, which
+    avoids complex roots of a product that is only nearly positive.
     """
     if not all(np.isfinite(part).all() for part in (mean, covariance, other_mean, other_covariance)):
         return float("nan")
@@ -51,9 +51,7 @@ def gaussian_distance(
 
 
 def split_floor(reference: Features, rng: np.random.Generator, repeats: int = 10) -> FrechetDistance:
-    """What two halves of one set are apart by, on average over random halvings: as near as that many samples can
-    come.
-    """
+    """Fréchet distance of two halves of one set, mean over random halvings: the floor for that number of samples."""
     if len(reference) < 4:
         raise ValueError(f"expected four or more vectors to halve; got {len(reference)}")
     half, values = len(reference) // 2, []
@@ -69,14 +67,14 @@ def speed_hellinger(
     """Hellinger distance of histograms of speeds, 0 to 1 (as in the GENEA challenges).
 
     Args:
-        width: of a bin, in the unit of the speeds; bins are the same for whatever is compared.
+        width: width of a bin, in the unit of the speeds.
         most: speeds beyond it share one bin.
     """
     if np.isnan(speeds).any() or np.isnan(reference).any():
         return float("nan")
     edges = np.append(np.arange(0.0, most + width / 2, width), np.inf)
     first, second = (np.histogram(np.abs(values), edges)[0] / max(1, len(values)) for values in (speeds, reference))
-    # By rounding, the sum of roots may exceed one.
+    # The sum of roots may exceed one by rounding.
     return float(np.sqrt(max(0.0, 1.0 - np.sum(np.sqrt(first * second)))))
 
 
@@ -89,6 +87,6 @@ def _covariance(values: Features) -> Float[np.ndarray, "F F"]:
 
 
 def _root(matrix: Float[np.ndarray, "F F"]) -> Float[np.ndarray, "F F"]:
-    """Square root of a symmetric matrix, whose tiny negative eigenvalues count as zero."""
+    """Square root of a symmetric matrix; tiny negative eigenvalues count as zero."""
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

@@ -1,7 +1,7 @@
-"""How different motions are from each other: clips of one motion, or motions for one audio.
+"""Diversity of motions: of the clips of one motion, or of several motions for one audio.
 
-Distances are L1 as in the position error: the norm of a joint's difference, averaged over frames and joints. More is
-better only for motion that is natural: jitter scores high.
+Distances are L1 as in the position error: the norm of a joint's difference, averaged over frames and joints. Higher
+is better only for natural motion: jitter is high too.
 """
 
 import jax
@@ -15,7 +15,7 @@ CLIP_FRAMES = 50
 
 @jax.jit
 def _pair_sum(motions: Float[Array, "N T J D"]) -> Float[Array, ""]:
-    """Sum over pairs of the mean L1 distance, one motion against all others at a time."""
+    """Sum over pairs of the mean L1 distance, one motion compared with all others at a time."""
 
     def against_all(motion: Float[Array, "T J D"]) -> Float[Array, ""]:
         distance = jnp.sum(jnp.abs(motions - motion[None]), axis=-1)
@@ -37,9 +37,9 @@ def mean_pair_distance(motions: Float[Array | np.ndarray, "N T J D"]) -> float:
 
 
 def paper_factor(count: int) -> float:
-    """What turns :func:`mean_pair_distance` into the published sums (Eq. 26 and 27).
+    """Factor from :func:`mean_pair_distance` to the published sums (Eq. 26 and 27).
 
-    They divide by ``N ceil(N / 2)`` where there are ``N (N - 1) / 2`` pairs: for 20 motions the value is 0.95 of the
+    These divide by ``N ceil(N / 2)`` where there are ``N (N - 1) / 2`` pairs: for 20 motions the value is 0.95 of the
     mean.
     """
     return (count * (count - 1) / 2) / (count * np.ceil(count / 2))
@@ -48,7 +48,7 @@ def paper_factor(count: int) -> float:
 def clips_of(
     motion: Float[Array | np.ndarray, "T J D"], frames: int = CLIP_FRAMES
 ) -> Float[Array | np.ndarray, "N F J D"]:
-    """A motion cut into clips one after another; a remainder is left out."""
+    """Consecutive clips of a motion; a remainder is left out."""
     count = motion.shape[0] // frames
     return motion[: count * frames].reshape(count, frames, *motion.shape[1:])
 
@@ -69,14 +69,12 @@ def multimodality(motions: Float[Array | np.ndarray, "N T J D"]) -> float:
 
 
 def l1_div(motion: Float[Array | np.ndarray, "T J D"], root: int | None = 0) -> float:
-    """L1div of BEAT's evaluation: how far joints are from their own mean, L1, averaged over frames and summed over
-    joints.
+    """L1div of BEAT's evaluation: L1 distance of joints from their own mean, mean over frames, summed over joints.
 
     Args:
-        root: joint that is taken from all others first, so that walking does not count; None leaves positions as they
-            are, as the authors do.
+        root: joint subtracted from all others, so that walking does not count; None for none, like the authors.
     """
-    places = jnp.asarray(motion)
+    positions = jnp.asarray(motion)
     if root is not None:
-        places = places - places[:, root : root + 1]
-    return float(jnp.mean(jnp.sum(jnp.abs(places - jnp.mean(places, axis=0, keepdims=True)), axis=(-2, -1))))
+        positions = positions - positions[:, root : root + 1]
+    return float(jnp.mean(jnp.sum(jnp.abs(positions - jnp.mean(positions, axis=0, keepdims=True)), axis=(-2, -1))))

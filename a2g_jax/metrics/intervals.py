@@ -1,4 +1,4 @@
-"""How sure a mean over clips is."""
+"""Confidence intervals of means over clips."""
 
 from typing import NamedTuple
 
@@ -16,9 +16,9 @@ class Interval(NamedTuple):
 
 
 def bootstrap_mean(values: Float[np.ndarray, " clips"], rng: np.random.Generator, draws: int = 2000) -> Interval:
-    """Mean over clips with the percentile bootstrap's 95 % interval; NaN values are left out, and not counted.
+    """Mean over clips with the 95 % interval of the percentile bootstrap; NaN values are ignored.
 
-    With one clip there is no interval: its ends are NaN.
+    The interval of a single clip is NaN.
     """
     values = np.asarray(values, np.float64)
     values = values[~np.isnan(values)]
@@ -37,5 +37,5 @@ def bootstrap_difference(
     rng: np.random.Generator,
     draws: int = 2000,
 ) -> Interval:
-    """Mean difference of two candidates on the same clips, by drawing clips: pairs that share a clip share its ease."""
+    """Mean paired difference of two candidates on the same clips, with its interval."""
     return bootstrap_mean(np.asarray(values, np.float64) - np.asarray(others, np.float64), rng, draws)

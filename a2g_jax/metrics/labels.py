@@ -1,4 +1,4 @@
-"""Scores against labels: emotion accuracy, and how well speakers or styles are grouped in a latent space."""
+"""Metrics with labels: emotion accuracy, and the grouping of speakers or styles in a latent space."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,14 +13,14 @@ def emotion_accuracy(logits: Float[np.ndarray, "n K"], labels: Labels) -> float:
 
 
 def confusion(logits: Float[np.ndarray, "n K"], labels: Labels) -> Int[np.ndarray, "K K"]:
-    """Counts of clips by their own emotion (rows) and the one found (columns)."""
+    """Confusion matrix: counts of clips by true (rows) and predicted (columns) emotion."""
     table = np.zeros((logits.shape[1],) * 2, np.int64)
     np.add.at(table, (labels, np.argmax(logits, axis=-1)), 1)
     return table
 
 
 def calinski_harabasz(points: Points, labels: Labels) -> float:
-    """CHI: spread between groups over spread within, each by its degrees of freedom (the flow paper's Table 3).
+    """Calinski-Harabasz index: variance between groups over variance within (the flow paper's Table 3).
 
     Raises:
         ValueError: fewer than two groups, or as many groups as points.
@@ -40,7 +40,7 @@ def calinski_harabasz(points: Points, labels: Labels) -> float:
 def silhouette(points: Points, labels: Labels) -> float:
     """Mean over points of ``(b - a) / max(a, b)``: a the mean distance to its own group, b to the nearest other one.
 
-    A point alone in its group counts 0. Memory grows with the square of the number of points.
+    The only point of a group counts 0. Memory grows with the square of the number of points.
 
     Raises:
         ValueError: fewer than two groups, or as many groups as points.

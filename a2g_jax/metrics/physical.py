@@ -1,20 +1,20 @@
-"""Whether a motion could be one: smoothness, rest, and feet that stay where they stand. Positions in metres."""
+"""Physical plausibility: smoothness, rest and foot skate. Positions in metres."""
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-#: A foot stands when it is this near to its lowest place (m) and this slow (m/s) in the vertical.
+#: A foot stands within this height (m) above its lowest position and below this vertical speed (m/s).
 FOOT_HEIGHT, FOOT_LIFT = 0.03, 0.1
 
 
 def jerk(positions: Float[Array | np.ndarray, "T *joints D"], fps: float) -> Float[Array, "t *joints"]:
-    """Length of the third difference times ``fps**3``, m/s^3; three frames fewer."""
+    """Norm of the third difference times ``fps**3``, m/s^3; three frames fewer."""
     return jnp.linalg.norm(jnp.diff(positions, n=3, axis=0), axis=-1) * fps**3
 
 
 def speeds(positions: Float[Array | np.ndarray, "T *joints D"], fps: float) -> Float[Array, "t *joints"]:
-    """Length of the first difference times ``fps``, m/s; one frame fewer."""
+    """Norm of the first difference times ``fps``, m/s; one frame fewer."""
     return jnp.linalg.norm(jnp.diff(positions, axis=0), axis=-1) * fps
 
 
@@ -26,10 +26,10 @@ def rest_share(positions: Float[Array | np.ndarray, "T J D"], fps: float, below:
 def foot_skate(
     feet: Float[Array | np.ndarray, "T F 3"], fps: float, up: int = 1, faster: float = 0.1
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """How feet slide while they stand: the share of standing time in which one goes faster than ``faster`` m/s along
-    the floor, and the way it goes then, in metres a second of standing.
+    """Foot skate: share of standing time in which a foot slides faster than ``faster`` m/s, and metres along the floor
+    per second of standing.
 
-    A foot stands in a frame where it is within 3 cm of its own lowest place and moves vertically at less than 0.1 m/s.
+    A foot stands in a frame where it is within 3 cm of its own lowest position and slower than 0.1 m/s vertically.
 
     Args:
         up: the vertical axis.

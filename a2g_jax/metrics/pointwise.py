@@ -1,19 +1,21 @@
-"""Scores that compare a motion with a target frame by frame and joint by joint.
+"""Metrics that compare a motion with a target frame by frame and joint by joint.
 
 Positions are (..., T, J, D) with D of 2 or 3, in any unit: results are in it. A NaN anywhere in a motion makes its
-score NaN; nothing is left out silently. Seed frames that a model was given should be cut off before scoring.
+value NaN; nothing is left out silently. Cut off the seed frames of a model before scoring.
 """
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.rotation import geodesic_distance
+from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 
 Positions = Float[Array | np.ndarray, "*batch T J D"]
 Rotations = Float[Array | np.ndarray, "*batch T J 3 3"]
 
-#: From wrist to wrist of Audio2Gestures' skeleton in T-pose, metres (extended paper, Eq. 23).
+#: Distance of the wrists of Audio2Gestures' skeleton in T-pose, metres (extended paper, Eq. 23).
 REFERENCE_WRIST_TO_WRIST = 1.2064
 
 
@@ -25,21 +27,37 @@ def position_l1(predicted: Positions, target: Positions) -> Float[Array, "*batch
 def position_l1_star(
     predicted: Positions, target: Positions, wrist_to_wrist: float, reference: float = REFERENCE_WRIST_TO_WRIST
 ) -> Float[Array, "*batch"]:
-    """:func:`position_l1` as it would be on a skeleton of the reference size (Eq. 23).
+    """:func:`position_l1` scaled to a skeleton of the reference size (Eq. 23).
 
     Args:
-        wrist_to_wrist: of the skeleton in T-pose, in the unit of ``reference``.
+        wrist_to_wrist: distance of the wrists in T-pose, in the unit of ``reference``.
+        reference: the same of the reference skeleton.
     """
     return position_l1(predicted, target) * (reference / wrist_to_wrist)
 
 
+def wrist_to_wrist(skeleton: Skeleton) -> float | None:
+    """Length of the bones from wrist to wrist in a T-pose, metres; None where wrists are not found."""
+    body = find_body(skeleton)
+    if body is None:
+        return None
+    lengths, chains = np.linalg.norm(np.asarray(skeleton.offsets), axis=-1), []
+    for side in "LR":
+        joint, chain = body[BODY_JOINTS.index(f"{side}_Wrist")], set()
+        while joint >= 0:
+            chain.add(joint)
+            joint = skeleton.parents[joint]
+        chains.append(chain)
+    return float(sum(lengths[joint] for joint in chains[0] ^ chains[1]))
+
+
 def position_l2(predicted: Positions, target: Positions) -> Float[Array, "*batch"]:
-    """Mean over frames and joints of a joint's distance from where it should be (EmotionGesture's L2)."""
+    """Mean over frames and joints of a joint's distance from its target (EmotionGesture's L2)."""
     return jnp.mean(jnp.linalg.norm(predicted - target, axis=-1), axis=(-2, -1))
 
 
 def speed_l1(predicted: Positions, target: Positions, fps: float = 1.0) -> Float[Array, "*batch"]:
-    """:func:`position_l1` of velocities ``(p[t+1] - p[t]) fps``; with ``fps`` 1 the paper's units a frame."""
+    """:func:`position_l1` of velocities ``(p[t+1] - p[t]) fps``; with ``fps`` 1 in the paper's units per frame."""
     return fps * position_l1(jnp.diff(predicted, axis=-3), jnp.diff(target, axis=-3))
 
 
@@ -52,12 +70,21 @@ def pck(predicted: Positions, target: Positions, threshold: float | Float[Array,
     """Percentage of correct keypoints, as a share: joints nearer than ``threshold`` to their targets (Eq. 24).
 
     Args:
-        threshold: in the unit of the positions. Audio2Gestures has 0.2, the flow paper's code 0.1 of TED's units.
+        threshold: in the unit of the positions: 0.2 in Audio2Gestures, 0.1 of TED's units in the flow paper's code.
     """
     distance = jnp.linalg.norm(predicted - target, axis=-1)
     share = jnp.mean((distance < threshold).astype(predicted.dtype), axis=(-2, -1))
     # A comparison with NaN is false, which would count a broken motion as merely wrong.
     return jnp.where(jnp.any(jnp.isnan(distance), axis=(-2, -1)), jnp.nan, share)
+
+
+def correct_within(target: Float[np.ndarray, "T P _"], metres: bool) -> float:
+    """Threshold of :func:`pck`: 0.2 m (Audio2Gestures), or without metres a fifth of the longer side of the box around
+    the mean pose (after Speech2Gesture's alpha of 0.2)."""
+    if metres:
+        return 0.2
+    mean = target.mean(axis=0)
+    return float(0.2 * np.max(mean.max(axis=0) - mean.min(axis=0)))
 
 
 def joint_rotation_error(predicted: Rotations, target: Rotations) -> Float[Array, "*batch"]:

@@ -1,4 +1,4 @@
-"""Does motion follow speech? Peaks of wrist speed against peaks of speech energy, with a null."""
+"""Agreement of motion with speech: peaks of wrist speed and peaks of speech energy, with a null."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ def speech_envelope(
 
 
 def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: float = 3.0) -> Float[np.ndarray, " P"]:
-    """Times (s) of the loud syllables: peaks that stand out by ``prominence`` dB and by the louder half of all."""
+    """Times of loud syllables, seconds: peaks with a prominence in dB that are among the louder half."""
     peaks, _ = signal.find_peaks(envelope, prominence=prominence)
     if len(peaks) == 0:
         return np.zeros(0)
@@ -36,7 +36,7 @@ def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: floa
 
 
 def wrist_speed(motion: Motion, smoothing: float = 0.05) -> Float[np.ndarray, " T"]:
-    """Speed of the faster wrist in m/s, smoothed by a Gaussian of that many seconds; of all joints without wrists."""
+    """Speed of the faster wrist, or of the fastest joint, in m/s, smoothed by a Gaussian of that width in seconds."""
     body = find_body(motion.skeleton)
     positions = motion.positions()
     if body is not None:
@@ -46,7 +46,7 @@ def wrist_speed(motion: Motion, smoothing: float = 0.05) -> Float[np.ndarray, " 
 
 
 def speed_peaks(speed: Float[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " P"]:
-    """Times (s) of strokes: peaks of speed that stand out by a quarter of its 95th percentile."""
+    """Times of strokes, seconds: peaks of speed with a prominence of a quarter of its 95th percentile."""
     peaks, _ = signal.find_peaks(speed, prominence=max(0.25 * float(np.percentile(speed, 95)), 1e-3))
     return peaks / fps
 
@@ -56,8 +56,8 @@ def agreement(
 ) -> float:
     """Mean over motion peaks of ``exp(-d^2 / 2 sigma^2)``, d the distance to the nearest speech peak, seconds.
 
-    The beat alignment of Li et al. 2021 ("AI Choreographer") with speech peaks for music beats; see
-    :func:`agreement_with_null` for what its number is worth.
+    The beat alignment of Li et al. 2021 ("AI Choreographer") with speech peaks instead of music beats; report
+    it with its null, :func:`agreement_with_null`.
 
     Args:
         lead: seconds by which a motion peak is expected before its speech peak.
@@ -69,7 +69,7 @@ def agreement(
 
 
 class Agreement(NamedTuple):
-    """A beat alignment beside what the same motion scores when it is shifted against the speech."""
+    """A beat alignment with its null: the same motion shifted relative to the speech."""
 
     value: float
     null_mean: float
@@ -78,7 +78,7 @@ class Agreement(NamedTuple):
 
     @property
     def z(self) -> float:
-        """How many standard deviations of the null the value lies above the null's mean."""
+        """Standard deviations of the null above its mean."""
         return (self.value - self.null_mean) / max(self.null_std, 1e-9)
 
 
@@ -91,7 +91,7 @@ def agreement_with_null(
     lead: float = 0.1,
     shifts: Float[np.ndarray, " K"] | None = None,
 ) -> Agreement:
-    """Agreement of speed peaks with energy peaks, and of the same motion moved by 1 to 5 s (circularly) either way.
+    """Agreement of speed peaks with energy peaks, and of the motion shifted circularly by 1 to 5 s in either direction.
 
     Args:
         lead: seconds from a stroke's fastest moment to its syllable's peak.

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 Positions = Float[Array | np.ndarray, "T J D"]
 
-#: Mean semantic score of BEAT, by which its authors' code divides.
+#: Mean semantic relevance of BEAT, by which its authors' code divides.
 BEAT_MEAN_RELEVANCE = 0.165
 
 
@@ -18,7 +18,7 @@ def srgr(
     NaN where no frame is relevant, or a position is NaN.
 
     Args:
-        relevance: of each frame, 0 or more.
+        relevance: weight of each frame, 0 or more.
         threshold: in the unit of the positions.
     """
     return jnp.sum(_correct(predicted, target, threshold) * relevance) / jnp.sum(jnp.asarray(relevance))
@@ -27,7 +27,7 @@ def srgr(
 def srgr_published(
     predicted: Positions, target: Positions, relevance: Float[Array | np.ndarray, " T"], threshold: float = 0.1
 ) -> Float[Array, ""]:
-    """As BEAT's public code has it, to compare with its published numbers: not bounded by 1.
+    """SRGR as in BEAT's public code, to compare with its published numbers: not bounded by 1.
 
     ``mean_t (c_t w_t / 0.165)`` with c the share of correct joints: a perfect motion of fully relevant frames scores
     6.06.

@@ -1,7 +1,7 @@
-"""How a clip's hands move on the whole, and how far a style has arrived in made motion.
+"""Style statistics of the hands of a clip, and the transfer of a style to generated motion.
 
-Height, speed and radius are those that StyleGestures steers by (Alexanderson et al. 2020, Sec. 3), over whole clips.
-Positions in metres, y up.
+Height, speed and radius are the control signals of StyleGestures (Alexanderson et al. 2020, Sec. 3), averaged
+over clips. Positions in metres, y up.
 """
 
 from typing import NamedTuple
@@ -12,20 +12,20 @@ from jaxtyping import Array, Float
 from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
-#: Of the 22 body joints.
+#: Rows among the 22 body joints.
 PELVIS = BODY_JOINTS.index("Pelvis")
 WRISTS = (BODY_JOINTS.index("L_Wrist"), BODY_JOINTS.index("R_Wrist"))
 
 
 class HandStyle(NamedTuple):
-    """Means over a clip and both hands; or, of :func:`share_of_the_way`, shares."""
+    """Means over a clip and both hands; for :func:`share_of_the_way`, shares."""
 
     height: float
-    """Of the wrists above the pelvis, metres."""
+    """Height of the wrists above the pelvis, metres."""
     speed: float
-    """Of the wrists against the pelvis, m/s."""
+    """Speed of the wrists relative to the pelvis, m/s."""
     radius: float
-    """From the wrists to the vertical through the pelvis, metres."""
+    """Distance of the wrists from the vertical through the pelvis, metres."""
 
 
 def hand_style(
@@ -37,32 +37,32 @@ def hand_style(
     """Height, speed and radius of a clip's hands.
 
     Args:
-        positions: of the joints in the world, two frames or more.
-        wrists: which joints are the hands; those of the 22 body joints unless told otherwise.
-        pelvis: which joint they are measured from.
+        positions: world positions of the joints, two frames or more.
+        wrists: rows of the hands; by default those of the 22 body joints.
+        pelvis: row of the reference joint.
 
     Raises:
-        ValueError: fewer than two frames, which tell no speed.
+        ValueError: fewer than two frames, which have no speed.
     """
     if len(positions) < 2:
         raise ValueError(f"expected 2 frames or more; got {len(positions)}")
-    places = np.asarray(positions, np.float32)
-    root = places[:, pelvis]
-    hands = places[:, list(wrists)]
-    # Speed against the pelvis: how the whole body goes is no style of the hands.
-    against = hands - root[:, None]
-    values = (hand_height(hands, root, fps, 0.0), hand_speed(against, fps, 0.0), hand_radius(hands, root, fps, 0.0))
+    points = np.asarray(positions, np.float32)
+    root = points[:, pelvis]
+    hands = points[:, list(wrists)]
+    # Speed relative to the pelvis: locomotion is not part of the style of the hands.
+    relative = hands - root[:, None]
+    values = (hand_height(hands, root, fps, 0.0), hand_speed(relative, fps, 0.0), hand_radius(hands, root, fps, 0.0))
     return HandStyle(*(float(np.mean(np.asarray(value, np.float64))) for value in values))
 
 
 def share_of_the_way(source: HandStyle, target: HandStyle, made: HandStyle, least: float = 1e-3) -> HandStyle:
-    """How far made motion went from the source's style to the target's: 0 not at all, 1 all the way, above 1 beyond.
+    """Share of the difference between the source's and the target's style that generated motion covers: 0 none, 1 all.
 
     Args:
-        source: of motion made for the same speech without the style.
-        target: of the clip whose style is wanted.
-        made: of motion made with it.
-        least: statistics of source and target that are nearer (metres, m/s) have no way between them: NaN.
+        source: statistics of motion generated for the same speech without the style.
+        target: statistics of the clip whose style is requested.
+        made: statistics of motion generated with the style.
+        least: smallest difference of source and target (metres, m/s) for a share; NaN below it.
     """
     shares = []
     for start, end, reached in zip(source, target, made, strict=True):

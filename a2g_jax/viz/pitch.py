@@ -1,9 +1,9 @@
-"""Pitch of a voice to draw: the fundamental frequency where there is one."""
+"""Pitch of a voice for drawing: the fundamental frequency of voiced frames."""
 
 import numpy as np
 from jaxtyping import Float
 
-#: Voices between these are found, Hz.
+#: Search range of the fundamental frequency, Hz.
 LOWEST, HIGHEST = 60.0, 500.0
 _WINDOW = 0.05
 _PERIODIC = 0.5
@@ -13,7 +13,7 @@ def pitch_curve(audio: Float[np.ndarray, " N"], sample_rate: int, rate: float = 
     """F0 in Hz at times ``k / rate``, NaN where the sound is silent or not periodic.
 
     The largest peak of the normalised autocorrelation of windows of 50 ms (Boersma 1993, without the path search), so
-    octave errors can happen: for pictures, not for measuring.
+    octave errors are possible: for pictures, not for measurements.
 
     Args:
         audio: mono samples.
@@ -37,7 +37,7 @@ def pitch_curve(audio: Float[np.ndarray, " N"], sample_rate: int, rate: float = 
     energy = power[:, 0]
     low, high = int(sampling / HIGHEST), min(int(sampling / LOWEST) + 1, window - 2)
     likeness = power / np.maximum(energy[:, None], 1e-12) / np.maximum(own / own[0], 0.05)
-    # A slight preference for short lags: their multiples fit as well.
+    # A slight preference for short lags, since their multiples fit as well.
     lags = np.arange(window)
     scores = np.where((lags >= low) & (lags <= high), likeness - 0.02 * np.log2(np.maximum(lags, 1) / low), -1.0)
     best = np.argmax(scores, axis=1)
@@ -55,8 +55,8 @@ def _without_jumps(pitch: Float[np.ndarray, " T"], reach: int) -> Float[np.ndarr
     padded = np.pad(pitch, reach, constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
     # The median without the NaNs, which sort last.
-    known = np.isfinite(windows).sum(axis=1)
-    middle = np.sort(windows, axis=1)[np.arange(len(pitch)), np.maximum(known - 1, 0) // 2]
+    finite = np.isfinite(windows).sum(axis=1)
+    middle = np.sort(windows, axis=1)[np.arange(len(pitch)), np.maximum(finite - 1, 0) // 2]
     kept = np.abs(np.log2(pitch / middle)) < 0.5
     alone = ~(np.roll(kept, 1) | np.roll(kept, -1))
     return np.where(kept & ~alone, pitch, np.nan)

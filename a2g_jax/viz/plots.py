@@ -10,25 +10,25 @@ from a2g_jax.geometry.body_joints import find_body
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
-#: The first is for what a motion is compared with.
+#: The first is for the reference of a comparison.
 COLOURS = ("#9aa5b4", "#2f6fde", "#d9822b", "#2a9d63")
 
 
 def film_strip(axes: Any, motions: Sequence[Motion], moments: int = 8) -> None:
-    """Stick figures seen from the front at moments spread evenly over time, the motions one over another.
+    """Draw stick figures from the front at evenly spaced moments, the motions over each other.
 
     Args:
-        axes: of Matplotlib.
-        motions: of the same length; the first is drawn pale.
-        moments: how many.
+        axes: Matplotlib axes.
+        motions: motions of the same length; the first is drawn pale.
+        moments: number of moments.
     """
     frames = min(motion.frames for motion in motions)
     for number, motion in enumerate(motions):
-        places = motion.positions()
-        places = places - places[:, :1]
+        positions = motion.positions()
+        positions = positions - positions[:, :1]
         colour = COLOURS[number % len(COLOURS)]
         for moment, frame in enumerate(np.linspace(0, frames - 1, moments).round().astype(int)):
-            x, y = places[frame, :, 0] + 1.1 * moment, places[frame, :, 1]
+            x, y = positions[frame, :, 0] + 1.1 * moment, positions[frame, :, 1]
             for joint, parent in enumerate(motion.skeleton.parents):
                 if parent >= 0:
                     axes.plot(
@@ -51,14 +51,14 @@ def wrist_heights(motion: Motion) -> Float[np.ndarray, "T 2"]:
     body = find_body(motion.skeleton)
     if body is None:
         raise ValueError("expected a body with two wrists")
-    places = motion.positions()
+    positions = motion.positions()
     wrists = [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
-    heights: Float[np.ndarray, "T 2"] = places[:, wrists, 1] - places[:, [0, 0], 1]
+    heights: Float[np.ndarray, "T 2"] = positions[:, wrists, 1] - positions[:, [0, 0], 1]
     return heights
 
 
 def compare_wrists(axes: Sequence[Any], motions: Sequence[Motion], labels: Sequence[str]) -> None:
-    """Heights of both wrists over time, the left one in the first axes, the right one in the second."""
+    """Draw the heights of both wrists over time, the left in the first axes, the right in the second."""
     for number, (motion, label) in enumerate(zip(motions, labels, strict=True)):
         heights = wrist_heights(motion)
         seconds = np.arange(motion.frames) / motion.fps
@@ -74,7 +74,7 @@ def compare_wrists(axes: Sequence[Any], motions: Sequence[Motion], labels: Seque
 def band_spectra(
     axes: Any, spectra: Sequence[Float[np.ndarray, "points C"]], labels: Sequence[str], fps: float
 ) -> None:
-    """Root mean square over channels of each DCT band, against its frequency."""
+    """Draw the root mean square over channels of each DCT band over its frequency."""
     for number, (bands, label) in enumerate(zip(spectra, labels, strict=True)):
         points = len(bands)
         hertz = np.arange(points) * fps / (2 * points)

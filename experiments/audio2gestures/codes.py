@@ -20,7 +20,7 @@ import jax
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.rhythm import agreement, speed_peaks
@@ -53,20 +53,20 @@ def dominance(speeds: np.ndarray) -> float:
     return float((left - right) / (left + right + 1e-9))
 
 
-def wrist_speeds(body: Body, pose: np.ndarray, fps: float) -> np.ndarray:
+def wrist_speeds(space: PoseSpace, pose: np.ndarray, fps: float) -> np.ndarray:
     """Speeds of both wrists, m/s, (T, 2), smoothed over 0.05 s."""
     from scipy.ndimage import gaussian_filter1d
 
-    places = gaussian_filter1d(body.wrists(body.places(pose)), 0.05 * fps, axis=0)
+    places = gaussian_filter1d(space.wrists(space.positions(pose)), 0.05 * fps, axis=0)
     return np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps
 
 
 def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     """Shares and agreements of exchanged codes with 95 % intervals over pairs."""
-    body, fps = Body(corpus.body, corpus.representation), corpus.fps
+    space, fps = corpus.space, corpus.fps
     networks = Codec(run.config.model_config, run.config.data())
     clips, features = clips_of(corpus)
-    speeds = [wrist_speeds(body, clip, fps) for clip in clips]
+    speeds = [wrist_speeds(space, clip, fps) for clip in clips]
     sides = np.array([dominance(one) for one in speeds])
     clear = np.nonzero(np.abs(sides) > CLEAR)[0]
     rng = np.random.default_rng(seed)
@@ -104,7 +104,7 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     generated = (drawn, drawn_hand, drawn_own, drawn_donor, drawn_unrelated)
     for poses, hands, *agreements in (swapped, generated):
         for (a, b), pose in zip(pairs, poses, strict=True):
-            ours = wrist_speeds(body, pose, fps)
+            ours = wrist_speeds(space, pose, fps)
             hands.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
             found = speed_peaks(ours.max(axis=1), fps)
             third = int(rng.integers(len(clips)))

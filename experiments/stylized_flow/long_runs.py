@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
 from a2g_jax.training.run import Run, open_run
@@ -25,13 +25,13 @@ STRETCH = 10.0
 FROZEN = 0.01
 
 
-def liveliness(body: Body, pose: Float[np.ndarray, "T R D"], mean: Float[np.ndarray, "P _"], fps: float) -> Any:
+def liveliness(space: PoseSpace, pose: Float[np.ndarray, "T R D"], mean: Float[np.ndarray, "P _"], fps: float) -> Any:
     """For every stretch of ten seconds: speed (m/s), frozen share, drift (cm) and spread (cm)."""
-    places, frames = body.places(pose), round(STRETCH * fps)
+    places, frames = space.positions(pose), round(STRETCH * fps)
     count = len(places) // frames
     rows = []
     for part in np.split(places[: count * frames], count):
-        speed = np.linalg.norm(np.diff(body.wrists(part), axis=0), axis=-1) * fps
+        speed = np.linalg.norm(np.diff(space.wrists(part), axis=0), axis=-1) * fps
         middle = part.mean(axis=0)
         rows.append(
             (
@@ -46,19 +46,19 @@ def liveliness(body: Body, pose: Float[np.ndarray, "T R D"], mean: Float[np.ndar
 
 def measure(run: Run, corpus: Corpus, frames: int, samples: int, seed: int) -> dict[str, Any]:
     """The first and the last quarter of generated motion, and the corpus's own stretches."""
-    body, fps = Body(corpus.body, corpus.representation), corpus.fps
+    space, fps = corpus.space, corpus.fps
     speech = np.concatenate([corpus.audio[s.start : s.stop] for s in corpus.segments("test")])
     speech = np.tile(speech, (-(-frames // len(speech)), 1))[:frames]
     truth = [np.asarray(corpus.pose[s.start : s.stop]) for s in corpus.segments("test")]
-    mean = np.concatenate([body.places(one) for one in truth]).mean(axis=0)
+    mean = np.concatenate([space.positions(one) for one in truth]).mean(axis=0)
     made = list(Generator(run).rows(np.asarray(speech, np.float32), samples, seed))
     finite = all(np.isfinite(one).all() for one in made)
     names = ("speed_m_s", "frozen_share", "drift_cm", "spread_cm")
     if not finite:
         return {"frames": frames, "samples": samples, "finite": False}
-    ours = np.stack([liveliness(body, one, mean, fps) for one in made])
+    ours = np.stack([liveliness(space, one, mean, fps) for one in made])
     quarter = max(1, ours.shape[1] // 4)
-    theirs = np.concatenate([liveliness(body, one, mean, fps) for one in truth])
+    theirs = np.concatenate([liveliness(space, one, mean, fps) for one in truth])
     summary = lambda rows: dict(zip(names, np.round(rows.reshape(-1, 4).mean(axis=0), 4).tolist(), strict=True))  # noqa: E731
     limit = np.percentile(theirs[:, 2], 99)
     return {

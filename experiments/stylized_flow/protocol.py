@@ -8,11 +8,12 @@ history it needs itself.
 from dataclasses import dataclass
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.continuation import continue_clips
 from a2g_jax.metrics import beats, diversity, physical
 from a2g_jax.metrics.distribution import frechet_distance
@@ -80,30 +81,30 @@ def scores_of(
     seed: int,
 ) -> dict[str, dict[str, Any]]:
     """Means over clips with 95 % intervals, and the best of a clip's samples, averaged over clips."""
-    corpus, body = ruler.corpus, Body(ruler.corpus.body, ruler.corpus.representation)
+    corpus, space = ruler.corpus, ruler.corpus.space
     audio, pose = clips_of(corpus, protocol, starts)
     inner = slice(protocol.first, protocol.last)
-    truth = [body.places(one[inner]) for one in pose]
+    truth = [space.positions(one[inner]) for one in pose]
     onsets = [beats.mel_onsets(one[inner], corpus.fps) for one in audio]
-    places = [[body.places(sample) for sample in clip] for clip in made]
+    places = [[space.positions(sample) for sample in clip] for clip in made]
     per_clip: dict[str, list[list[float]]] = {name: [] for name in ("position_l1", "pck", "beat_alignment", "jerk")}
     for clip, target, speech in zip(places, truth, onsets, strict=True):
         near = body.near(target)
         distance = [np.abs(sample - target) for sample in clip]
-        per_clip["position_l1"].append([body.scale * float(d.sum(-1).mean()) for d in distance])
+        per_clip["position_l1"].append([space.scale * float(d.sum(-1).mean()) for d in distance])
         per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])
         moves = [beats.motion_beats(sample, corpus.fps, smoothing=2.0 / corpus.fps) for sample in clip]
         sigma = beats.FLOW_SIGMA_FRAMES / corpus.fps
         per_clip["beat_alignment"].append([beats.beat_alignment(m, speech, sigma) for m in moves if len(speech)])
-        per_clip["jerk"].append([_jerk(body, sample, corpus.fps) for sample in clip])
+        per_clip["jerk"].append([_jerk(space, sample, corpus.fps) for sample in clip])
     rng = np.random.default_rng(seed)
     summary = {name: _summary(name, values, rng) for name, values in per_clip.items()}
     if made.shape[1] > 1:
-        spread = [body.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
+        spread = [space.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
         summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
     if len(made) > 1:
         # Between the first samples of different clips, as in the paper; not within a long motion.
-        apart = body.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
+        apart = space.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
         summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
     if ruler.network is not None:
         features = lambda poses: np.concatenate([ruler.network.clip_features(one) for one in poses])  # noqa: E731
@@ -113,8 +114,8 @@ def scores_of(
     return summary
 
 
-def _jerk(body: Body, places: Float[np.ndarray, "T P D"], fps: float) -> float:
-    return float(np.percentile(np.asarray(physical.jerk(body.wrists(places), fps)), 90))
+def _jerk(space: PoseSpace, places: Float[np.ndarray, "T P D"], fps: float) -> float:
+    return float(np.percentile(np.asarray(physical.jerk(space.wrists(places), fps)), 90))
 
 
 def _summary(name: str, values: list[list[float]], rng: np.random.Generator) -> dict[str, Any]:
@@ -129,9 +130,7 @@ def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str
     starts = starts_of(ruler.corpus, protocol)
     _, pose = clips_of(ruler.corpus, protocol, starts)
     inner = pose[:, protocol.first : protocol.last]
-    mean = np.asarray(ruler.corpus.statistics["pose"].mean)
-    if ruler.corpus.representation == "directions":
-        mean = mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-6)
+    mean = np.asarray(ruler.corpus.space.valid(jnp.asarray(ruler.corpus.statistics["pose"].mean)))
     candidates = {
         "truth": inner,
         # A take may have a single clip.

@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
@@ -69,9 +69,9 @@ def styles_of(
     run: Run, corpus: Corpus, features: list[Float[np.ndarray, "T bands"]], samples: int, seed: int
 ) -> Float[np.ndarray, "N samples 3"]:
     """Hand style of every motion."""
-    body, generator = Body(corpus.body, corpus.representation), Generator(run)
+    space, generator = corpus.space, Generator(run)
     return np.array(
-        [[hand_style(body.places(rows), corpus.fps) for rows in generator.rows(one, samples, seed)] for one in features]
+        [[hand_style(space.positions(rows), corpus.fps) for rows in generator.rows(one, samples, seed)] for one in features]
     )
 
 

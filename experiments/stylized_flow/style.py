@@ -20,7 +20,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.evaluation.places import Body
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style
 from a2g_jax.geometry.pose_track import represent
@@ -51,7 +51,7 @@ def clip_features(pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, " F"]:
 def speaker_classifier(corpus: Corpus) -> tuple[Any, float, dict[str, HandStyle]]:
     """Classifier trained on the training split, its accuracy on the test split, and each speaker's hand style."""
     frames = round(SECONDS * corpus.fps)
-    body = Body(corpus.body, corpus.representation)
+    space = corpus.space
 
     def pieces(split: str) -> list[tuple[str, np.ndarray]]:
         return [
@@ -66,7 +66,7 @@ def speaker_classifier(corpus: Corpus) -> tuple[Any, float, dict[str, HandStyle]
     accuracy = model.score([clip_features(pose) for _, pose in test], [name for name, _ in test])
     styles = {
         name: HandStyle(
-            *np.mean([hand_style(body.places(pose), corpus.fps) for who, pose in train if who == name], axis=0)
+            *np.mean([hand_style(space.positions(pose), corpus.fps) for who, pose in train if who == name], axis=0)
         )
         for name in sorted({who for who, _ in train})
     }
@@ -91,10 +91,10 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
     model, accuracy, styles = speaker_classifier(corpus)
     unit = np.std([np.array(style) for style in styles.values()], axis=0)
     names = list(SPEAKERS)
-    representation = run.config.representation
+    kind = run.config.space.kind
 
     def likelihood(motions: Any, speaker: str) -> float:
-        rows = [clip_features(represent(one, representation, "motion")[0]) for one in motions]
+        rows = [clip_features(represent(one, kind, "motion")[0]) for one in motions]
         return float(model.predict_proba(rows)[:, list(model.classes_).index(speaker)].mean())
 
     rows: dict[str, list[dict[str, float]]] = {}

@@ -31,7 +31,7 @@ def name_of(corpus: Corpus) -> str:
     if corpus.recipe.get("reader") != "talker":
         return corpus.fingerprint[:16]
     recipe = {key: value for key, value in corpus.recipe.items() if key in _RECIPE}
-    about = [recipe, corpus.representation, corpus.fps, asdict(corpus.mel)]
+    about = [recipe, corpus.space.kind, corpus.fps, asdict(corpus.mel)]
     return f"talker {hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()[:9]}"
 
 

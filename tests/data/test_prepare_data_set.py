@@ -100,7 +100,7 @@ def test_generated_talk_as_data_sets_show_it(tmp_path, capsys, view):
     assert main(["prepare", "talker", "--minutes", "0.2", "--view", view, "--out", str(out), "--workers", "1"]) == 0
     corpus = Corpus.open(out)
     shape = {"beat": (47, 6), "ted": (9, 3), "ted-expressive": (42, 3), "s2g": (49, 2)}[view]
-    assert (corpus.fps, corpus.representation) == (15.0, VIEWS[view].pose)
+    assert (corpus.fps, corpus.space.kind) == (15.0, VIEWS[view].pose)
     assert corpus.pose.shape[1:] == shape
     if view == "beat":
         assert corpus.skeleton.joints == 47

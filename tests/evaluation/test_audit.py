@@ -38,27 +38,27 @@ def true_generator(takes):
     """Right motions for whatever speech can be understood; rest where there is none."""
     known = {}
 
-    def listen(heard, seed):
-        if heard.condition in ("silence", "loudness alone"):
+    def listen(audio, seed):
+        if audio.condition in ("silence", "loudness alone"):
             return np.zeros((takes[0].motion.frames, 2, 3), np.float32) + 0.01 * seed
-        if (heard.clip, seed) not in known:
-            motion, _ = resample_motion(takes[heard.clip], jax.random.key(seed))
-            known[heard.clip, seed] = wrists(dataclasses.replace(motion))
-        return np.roll(known[heard.clip, seed], round(heard.shift * FPS), axis=0)
+        if (audio.clip, seed) not in known:
+            motion, _ = resample_motion(takes[audio.clip], jax.random.key(seed))
+            known[audio.clip, seed] = wrists(dataclasses.replace(motion))
+        return np.roll(known[audio.clip, seed], round(audio.shift * FPS), axis=0)
 
     return listen
 
 
-def deaf(heard, seed):
+def deaf(audio, seed):
     """Lively motion that is a function of the seed alone."""
-    noise = np.random.default_rng(seed).normal(size=(len(heard.features), 2, 3))
+    noise = np.random.default_rng(seed).normal(size=(len(audio.features), 2, 3))
     return 0.3 * ndimage.gaussian_filter1d(noise, 5.0, axis=0)
 
 
-def amplitude(heard, seed):
+def amplitude(audio, seed):
     """Hands that rise and fall with the level, with a tremor of their own."""
-    level = ndimage.gaussian_filter1d(heard.features.mean(axis=1), 2.0)
-    places = 0.3 * deaf(heard, seed)
+    level = ndimage.gaussian_filter1d(audio.features.mean(axis=1), 2.0)
+    places = 0.3 * deaf(audio, seed)
     places[:, :, 1] += 0.01 * level[:, None]
     return places
 
@@ -84,21 +84,21 @@ def test_an_amplitude_follower_is_flagged(clips):
 
 
 def test_a_motion_for_somebody_elses_audio_is_flagged(true_generator, clips):
-    """It hears, but what it does is late by half a second to two."""
+    """It responds, but what it does is late by half a second to two."""
 
-    def late(heard, seed):
-        return np.roll(true_generator(heard, seed), 17 + 11 * heard.clip, axis=0)
+    def late(audio, seed):
+        return np.roll(true_generator(audio, seed), 17 + 11 * audio.clip, axis=0)
 
     (verdict,) = listening_audit(late, clips, SPEAKERS, FPS)["verdicts"]
     assert "agrees no more with its own audio" in verdict
 
 
 def test_conditions_take_level_and_spectrum_apart(clips):
-    heard = {each.condition: each.features for each in conditions(clips, 1, FPS, SPEAKERS)}
+    audio = {each.condition: each.features for each in conditions(clips, 1, FPS, SPEAKERS)}
     own = clips[1]
-    np.testing.assert_allclose(heard["even loudness"].mean(axis=1), own.mean(), atol=1e-3)
-    np.testing.assert_allclose(heard["loudness alone"].mean(axis=1), own.mean(axis=1), atol=1e-3)
-    assert np.ptp(heard["loudness alone"] - heard["loudness alone"].mean(axis=1, keepdims=True), axis=0).max() < 1e-3
-    np.testing.assert_array_equal(heard["1 s late"][30:60], own[:30])
-    assert np.ptp(heard["silence"]) == 0.0
-    assert not np.array_equal(heard["another speaker"], own)
+    np.testing.assert_allclose(audio["even loudness"].mean(axis=1), own.mean(), atol=1e-3)
+    np.testing.assert_allclose(audio["loudness alone"].mean(axis=1), own.mean(axis=1), atol=1e-3)
+    assert np.ptp(audio["loudness alone"] - audio["loudness alone"].mean(axis=1, keepdims=True), axis=0).max() < 1e-3
+    np.testing.assert_array_equal(audio["1 s late"][30:60], own[:30])
+    assert np.ptp(audio["silence"]) == 0.0
+    assert not np.array_equal(audio["another speaker"], own)

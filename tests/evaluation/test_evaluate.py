@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -15,9 +16,12 @@ from a2g_jax.evaluation import baselines as candidates
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge, relevance
 from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.evaluation.places import Body
-from a2g_jax.evaluation.report import check_comparable, latex, markdown, write_report
-from a2g_jax.evaluation.scores import Scorer, Target
+from a2g_jax.geometry.pose_space import PoseSpace
+from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, write_report
+from a2g_jax.evaluation.scores import Metric, Scorer, Target
+from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.rotation import axis_angle_from_matrix
+from a2g_jax.metrics.pointwise import wrist_to_wrist
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
@@ -27,7 +31,7 @@ from a2g_jax.training.run import RunConfig
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    """Ten generated recordings of twelve seconds, as 'a2g prepare talker' tells of them."""
+    """Ten generated recordings of twelve seconds, as of 'a2g prepare talker'."""
     roles = [{**role, "seconds": 12.0} for role in cast(10.0, 5, (), ("neutral", "anger"))[:10]]
     rows = (prepare_recording(talk(**role), Features()) for role in roles)
     recipe = {"reader": "talker", "roles": roles, "fingers": False, "jitter": 0.0, "view": "body"}
@@ -36,7 +40,7 @@ def corpus(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def network(corpus, tmp_path_factory):
-    """A feature network that has seen the corpus for a moment."""
+    """A feature network trained on the corpus for a moment."""
     small = dataclasses.replace(
         find_model("motion_autoencoder").presets["tiny"],
         encoder_channels=(16, 16, 16, 24, 8),
@@ -78,6 +82,28 @@ def test_more_noise_is_worse(result):
     assert score(result, "truth, 1 degree of noise", "mpjre") == pytest.approx(2 * np.sqrt(2 / np.pi), rel=0.03)
 
 
+def test_noise_is_the_same_in_every_representation_of_rotations(corpus):
+    """Noise on exponential maps turns joints by the angles of noise on 6D."""
+    pose = np.asarray(corpus.pose[:50])
+    rotations = rotations_from_rows(pose, "6d")
+    maps = np.asarray(axis_angle_from_matrix(jnp.asarray(rotations)))
+    noisy = candidates.with_noise(pose, 5.0, np.random.default_rng(0))
+    same = candidates.with_noise(maps, 5.0, np.random.default_rng(0), "exponential")
+    assert same.shape == maps.shape
+    np.testing.assert_allclose(rotations_from_rows(same, "exponential"), rotations_from_rows(noisy, "6d"), atol=1e-4)
+
+
+def test_exponential_maps_have_their_noise_rows(corpus, tmp_path):
+    features = Features(pose="exponential")
+    roles = corpus.recipe["roles"][:2]
+    rows = (prepare_recording(talk(**{**role, "seconds": 5.0}), features) for role in roles)
+    maps = write_corpus(tmp_path / "corpus", rows, features=features, recipe={"reader": "folder"})
+    table = evaluate({}, maps, split="train", samples=1)
+    little, much = (score(table, f"truth, {name} of noise", "mpjre") for name in ("1 degree", "5 degrees"))
+    assert little == pytest.approx(2 * np.sqrt(2 / np.pi), rel=0.05)
+    assert much > 4 * little
+
+
 def test_other_right_motions_are_the_floor(result):
     """As far as any right motion is from another; nearer in distribution and shape than a stranger's or no motion."""
     right = "another right motion"
@@ -115,7 +141,7 @@ def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config
 def test_reports_say_what_they_are_of(result):
     text = markdown(result)
     assert "| mean pose | 1 |" in text
-    assert "No score here is a claim" in text
+    assert "No score here measures" in text
     assert result["about"]["feature_network"][:16] in text
     assert latex(result).count(r"\\") == len(result["rows"]) + 1
     json.dumps(result, allow_nan=False)
@@ -168,6 +194,21 @@ def test_a_single_recording_is_scored_in_pieces_and_the_report_says_so(corpus):
     assert "pieces of 1 recording(s), which are not independent" in markdown(pieces)
 
 
+def test_a_metric_of_another_package_has_its_column(corpus):
+    """The other scores do not change; the report is readable where that package is not installed."""
+    hands = Metric("hands", "cm", "lower", "ours", 1, key="hands", function=lambda motion: motion.wrists.max())
+    pairs = Metric("x", "", "higher", "ours", key="x", scope="pair", function=lambda pair: pair.positions.max())
+    spread = Metric("y", "", "truth", "ours", key="y", scope="clip", function=lambda clip: len(clip.motions))
+    plain, more = (evaluate({}, corpus, samples=2, extra_metrics=extra) for extra in ((), (hands, pairs, spread)))
+    assert score(more, "another right motion", "y") == 2.0
+    for before, after in zip(plain["rows"], more["rows"], strict=True):
+        assert {name: cell for name, cell in after["scores"].items() if name not in ("hands", "x", "y")} == before[
+            "scores"
+        ]
+    text = markdown(merge({"a": plain, "b": json.loads(json.dumps(more))}))
+    assert "hands, cm ↓" in text
+
+
 def test_reports_are_put_side_by_side(corpus, tmp_path, capsys):
     """Two reports of the same thing become one; the baselines are there once, clashing names say their report."""
     table = evaluate({}, corpus, samples=2)
@@ -201,7 +242,7 @@ def test_speakers_are_grouped_by_their_motion_but_not_by_the_mean_pose(result):
 
 def test_the_reach_of_the_skeleton_scales_the_starred_error(corpus, result):
     row = next(row for row in result["rows"] if row["name"] == "mean pose")["scores"]
-    reach = Body(corpus.body).reach()
+    reach = wrist_to_wrist(corpus.body)
     assert 1.0 < reach < 1.6
     expected = row["position_l1"]["mean"] * 1.2064 / reach
     assert row["position_l1_star"]["mean"] == pytest.approx(expected, rel=1e-6)
@@ -212,15 +253,15 @@ def test_semantic_labels_are_weights_of_frames(corpus):
     """SRGR counts the labelled frames alone."""
     segment = corpus.segments("test")[0]
     labels = [{"label": "deictic", "start": 1.0, "end": 2.0, "score": 0.5}]
-    told = dataclasses.replace(corpus)
-    object.__setattr__(told, "annotations", lambda recording: {"semantic": labels})
-    values = relevance(told, segment)
+    labelled = dataclasses.replace(corpus)
+    object.__setattr__(labelled, "annotations", lambda recording: {"semantic": labels})
+    values = relevance(labelled, segment)
     assert values.shape == (segment.frames,)
     assert set(np.nonzero(values)[0]) == set(range(30, 60))
     assert relevance(corpus, segment) is None
-    scorer = Scorer(Body(corpus.body), corpus.fps, None)
+    scorer = Scorer(PoseSpace(corpus.body), corpus.fps, None)
     pose = np.asarray(corpus.pose[segment.start : segment.stop])
-    target = Target(pose, scorer.body.places(pose), np.arange(5.0), "neutral", values)
+    target = Target(pose, scorer.space.positions(pose), np.arange(5.0), "neutral", values)
     spoilt = pose.copy()
     spoilt[100:] = pose[:1]
     assert scorer.sample(spoilt, target)["srgr"] == 1.0

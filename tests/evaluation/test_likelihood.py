@@ -12,7 +12,7 @@ from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regression
-from a2g_jax.evaluation.likelihood import bits_per_dim, fit_gaussian, gaussian_bits_per_dim, told_rows
+from a2g_jax.evaluation.likelihood import bits_per_dim, conditioning_rows, fit_gaussian, gaussian_bits_per_dim
 from a2g_jax.evaluation.likelihood_clips import clip_batches, clip_starts
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
@@ -127,7 +127,7 @@ def test_bits_of_the_gaussian_are_those_of_scipy_and_above_the_noise(run, corpus
     gaussian = fit_gaussian(run.config, corpus)
     starts = clip_starts(run.config, corpus, "test")
     for noise, ours in ((0.02, found.noisy_clips), (0.0, found.clean_clips)):
-        given, values = told_rows(run.config)(next(clip_batches(run.config, corpus, starts[:1], noise, 0)))
+        given, values = conditioning_rows(run.config)(next(clip_batches(run.config, corpus, starts[:1], noise, 0)))
         # Two poses of 66 values and four frames of four bands.
         assert given.shape == (21, 2 * 66 + 4 * 4)
         residual = values - (gaussian.offset + given @ gaussian.weights)

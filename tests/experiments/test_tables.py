@@ -99,7 +99,7 @@ def test_a_record_serves_another_table_only_if_it_was_scored_alike(folder):
 
 def corpus(recipe, fingerprint="f" * 64):
     mel = MelConfig()
-    return SimpleNamespace(recipe=recipe, fingerprint=fingerprint, representation="6d", fps=30.0, mel=mel)
+    return SimpleNamespace(recipe=recipe, fingerprint=fingerprint, space=SimpleNamespace(kind="6d"), fps=30.0, mel=mel)
 
 
 def test_a_generated_corpus_is_known_by_its_recipe_and_a_recorded_one_by_its_arrays():

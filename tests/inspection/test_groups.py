@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
@@ -14,11 +15,13 @@ from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
+from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.training.run import Run, save_run
 
 DEMO = Path(__file__).parents[2] / "a2g_jax" / "demo"
 
@@ -79,18 +82,18 @@ def test_skeletons():
     taller = usual.scaled(1.1)
     assert codes(check_skeletons([*many, taller], names, speakers)) == set()
     assert codes(check_skeletons([*many, taller], names, ["ada"] * 5)) == {"bones"}
-    (told,) = check_skeletons([*many, taller], names)
-    assert (told.severity, told.code) == ("info", "bones")
+    (found,) = check_skeletons([*many, taller], names)
+    assert (found.severity, found.code) == ("info", "bones")
     lowered = offsets.copy()
     for joint in ("L_Elbow", "L_Wrist"):
         x, y, z = lowered[usual.index(joint)]
         lowered[usual.index(joint)] = (x * 0.7 + y * 0.7, -x * 0.7 + y * 0.7, z)
-    (told,) = check_skeletons([*many, replace(usual, offsets=lowered)], names, speakers)
-    assert (told.code, told.place.recording) == ("rest-pose", "take4")
+    (found,) = check_skeletons([*many, replace(usual, offsets=lowered)], names, speakers)
+    assert (found.code, found.place.recording) == ("rest-pose", "take4")
     renamed = replace(usual, names=(*usual.names[:-1], "R_Hand"))
-    (told,) = check_skeletons([renamed, *many], names)
-    assert (told.code, told.place.recording) == ("skeleton", "take0")
-    assert "lacks R_Wrist; has R_Hand" in told.message
+    (found,) = check_skeletons([renamed, *many], names)
+    assert (found.code, found.place.recording) == ("skeleton", "take0")
+    assert "lacks R_Wrist; has R_Hand" in found.message
 
 
 def test_rest_pose_in_a_folder(folder, tmp_path):
@@ -199,7 +202,7 @@ def test_late_motion_in_a_corpus(tmp_path):
     (found,) = (x for x in report.findings if x.severity == "warning")
     assert (found.code, found.place.recording) == ("offset", "long")
     assert found.value == pytest.approx(0.7, abs=0.1)
-    assert report.facts["offset"]["told in"] == "1 of 1 recordings"
+    assert report.facts["offset"]["measured in"] == "1 of 1 recordings"
 
 
 def test_run(tmp_path):
@@ -222,6 +225,22 @@ def test_run(tmp_path):
         "nan": "warning",
     }
     assert report.facts["last losses"]["validation"]["loss"] == 1.4
+
+
+@pytest.mark.parametrize(("kind", "rows", "width"), [("directions", 2, 3), ("keypoints", 3, 2)])
+def test_run_without_a_skeleton(kind, rows, width, toy_run_config, tmp_path):
+    layout = PoseLayout(("hip", "neck", "hand"), ((0, 1), (1, 2)), (0.5, 0.6) if kind == "directions" else ())
+    config = toy_run_config()
+    pose = Statistics(np.zeros((rows, width), np.float32), np.ones((rows, width), np.float32))
+    config = replace(config, body=layout, representation=kind, statistics={**config.statistics, "pose": pose})
+    code = np.ones((1, config.model_config.code_channels), np.float32)
+    summary = {"specific_mean": code, "specific_std": code}
+    save_run(tmp_path / "run", Run(config, config.build().init(jax.random.key(0)), summary, 30))
+    report = inspect(tmp_path / "run")
+    assert report.facts["points"]["bones"] == ["hip-neck", "neck-hand"]
+    assert ("bone lengths (cm)" in report.facts["points"]) == (kind == "directions")
+    assert report.facts["run"]["pose"] == f"{kind}, {rows} rows"
+    assert "hip-neck" in report.text()
 
 
 def test_cast_is_varied():

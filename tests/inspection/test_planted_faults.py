@@ -12,7 +12,7 @@ from a2g_jax.inspection.audio_checks import check_audio, clipped_share
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.sync import RATE as RATE_OF_OFFSETS
-from a2g_jax.inspection.sync import at_rate, check_lengths, check_offset, energy_db, measure_offset, wrist_places
+from a2g_jax.inspection.sync import at_rate, check_lengths, check_offset, energy_db, measure_offset, wrist_positions
 from a2g_jax.io.bvh import write_bvh
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])
@@ -39,11 +39,11 @@ def test_wrong_rate(rate, tmp_path):
     assert codes(report.findings) == {"frame-time"}
     (found,) = (finding for finding in report.findings if finding.severity == "warning")
     assert found.value == pytest.approx(rate, rel=0.01)
-    assert f"Frame Time: {1 / found.value:.8f}" in found.mend
+    assert f"Frame Time: {1 / found.value:.8f}" in found.fix
 
 
 def test_broadcast_rate():
-    """29.97 fps read as 30 is told in ten minutes; a recorder that stops a second later is no fault."""
+    """29.97 fps read as 30 is found in ten minutes; a recorder that stops a second later is no fault."""
     seconds = 600.0
     (found,) = check_lengths(round(seconds * 30000 / 1001), 30.0, seconds)
     assert found.code == "frame-time"
@@ -56,7 +56,7 @@ def test_broadcast_rate():
 @pytest.mark.parametrize("late", [0.5, -0.5, 3.0])
 def test_offset(late):
     """Half a second or more, either way."""
-    wrists = at_rate(wrist_places(long_talk().motion, find_rig(long_talk().motion)), 30.0)
+    wrists = at_rate(wrist_positions(long_talk().motion, find_rig(long_talk().motion)), 30.0)
     energy, cut = energy_db(long_talk().audio, RATE, 64.0), round(abs(late) * RATE_OF_OFFSETS)
     offset = measure_offset(energy[cut:], wrists) if late > 0 else measure_offset(energy, wrists[cut:])
     (found,) = check_offset(offset)
@@ -69,21 +69,21 @@ def test_offset_of_files(tmp_path):
     bvh, wav = write_pair(tmp_path, moved)
     report = inspect(bvh, wav)
     assert codes(report.findings) == {"offset"}, report.text()
-    assert "Cut 0.5" in report.findings[-1].mend
+    assert "Cut 0.5" in report.findings[-1].fix
 
 
-def test_offset_is_not_told_where_it_cannot_be():
-    """Neither of another speech (the same backwards), nor of a short one."""
+def test_offsets_of_unrelated_or_short_recordings_are_not_significant():
+    """The speech backwards is unrelated; a short one has no offset."""
     motion = long_talk().motion
-    wrists = at_rate(wrist_places(motion, find_rig(motion)), 30.0)
-    known = measure_offset(energy_db(long_talk().audio, RATE, 64.0), wrists)
-    assert known.known
-    assert check_offset(known) == []
+    wrists = at_rate(wrist_positions(motion, find_rig(motion)), 30.0)
+    related = measure_offset(energy_db(long_talk().audio, RATE, 64.0), wrists)
+    assert related.significant
+    assert check_offset(related) == []
     near = measure_offset(energy_db(long_talk().audio[RATE // 8 :], RATE, 60.0), wrists)
-    assert near.seconds - known.seconds == pytest.approx(0.125, abs=0.03)
+    assert near.seconds - related.seconds == pytest.approx(0.125, abs=0.03)
     assert check_offset(near) == []
     other = measure_offset(energy_db(long_talk().audio[::-1].copy(), RATE, 64.0), wrists)
-    assert not other.known
+    assert not other.significant
     assert check_offset(other) == []
     assert measure_offset(energy_db(long_talk().audio, RATE, 15.0), wrists) is None
     assert measure_offset(np.zeros(2000), wrists) is None

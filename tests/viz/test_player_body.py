@@ -1,29 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.geometry.retarget import find_rig
+from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.viz.player.body import build_body
-from a2g_jax.viz.player.roles import find_roles, split_name
+from a2g_jax.viz.player.roles import find_roles
 from a2g_jax.viz.player.stage import body_points, placement
 from tests.viz.figures_for_tests import body_skeleton, waving
 
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("L_Wrist", ("left", "wrist")),
-        ("mixamorig:RightForeArm", ("right", "forearm")),
-        ("forearm.L", ("left", "forearm")),
-        ("Bip01 R UpperArm", ("right", "bip01upperarm")),
-        ("lCollar", ("left", "collar")),
-        ("upperarm_r", ("right", "upperarm")),
-        ("Root", ("", "root")),
-        ("LowerBack", ("", "lowerback")),
-    ],
-)
-def test_side_and_base_of_names(name, expected):
-    assert split_name(name) == expected
+MIXAMO = {
+    "Hip": "UpLeg", "Knee": "Leg", "Ankle": "Foot", "Foot": "ToeBase",
+    "Collar": "Shoulder", "Shoulder": "Arm", "Elbow": "ForeArm", "Wrist": "Hand",
+}  # fmt: skip
 
 
 def test_roles_of_the_body_joints():
@@ -39,6 +30,28 @@ def test_roles_of_the_body_joints():
     arm, leg = roles.arms["right"], roles.legs["left"]
     assert [names[j] for j in (arm.top, arm.middle, arm.tip)] == ["R_Shoulder", "R_Elbow", "R_Wrist"]
     assert [names[j] for j in (leg.top, leg.middle, leg.tip)] == ["L_Hip", "L_Knee", "L_Ankle"]
+
+
+@pytest.mark.parametrize(
+    "rename",
+    [
+        lambda name: name,
+        lambda name: (
+            {"L": "mixamorig:Left", "R": "mixamorig:Right"}[name[0]] + MIXAMO[name[2:]] if name[1] == "_" else name
+        ),
+        lambda name: f"joint{BODY_JOINTS.index(name)}",
+    ],
+)
+def test_the_limbs_are_those_that_retargeting_moves(rename):
+    """Whatever the joints are called, or if their names say nothing."""
+    skeleton = replace(body_skeleton(), names=tuple(rename(name) for name in BODY_JOINTS))
+    found, joints = find_roles(skeleton), find_rig(skeleton).roles
+    for letter, side in (("L", "left"), ("R", "right")):
+        arm, leg = found.arms[side], found.legs[side]
+        assert [arm.top, arm.middle, arm.tip] == [joints[f"{letter}_{part}"] for part in ("Shoulder", "Elbow", "Wrist")]
+        assert [leg.top, leg.middle, leg.tip] == [joints[f"{letter}_{part}"] for part in ("Hip", "Knee", "Ankle")]
+    assert found.arms["left"].tip == BODY_JOINTS.index("L_Wrist")
+    assert any(shape.tint == "eye" for shape in build_body(skeleton).shapes) == (found.head is not None)
 
 
 def test_extra_points_are_rigid_to_their_joints():

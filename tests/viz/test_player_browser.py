@@ -148,7 +148,7 @@ def test_buttons_have_names_and_the_page_fits_a_phone(browser, page_file):
         assert (saturation(picture(page)) > 60).any()
 
 
-def test_screenshot_has_the_size_asked_for(browser, page_file, tmp_path, monkeypatch):
+def test_screenshot_has_the_requested_size(browser, page_file, tmp_path, monkeypatch):
     # Its own playwright cannot run inside that of the fixture, so run it as users do: in a process of its own.
     code = (
         "import sys; from a2g_jax.viz.player import screenshot_page as s;"

@@ -28,10 +28,10 @@ def page_file(recording, tmp_path_factory):
 
 def test_pitch_of_a_tone_and_of_silence():
     pitch = pitch_curve(tone(2.0), 16000)
-    heard = pitch[np.isfinite(pitch)]
+    voiced = pitch[np.isfinite(pitch)]
     assert len(pitch) == 100
-    assert len(heard) > 50
-    np.testing.assert_allclose(heard, 220.0, rtol=0.01)
+    assert len(voiced) > 50
+    np.testing.assert_allclose(voiced, 220.0, rtol=0.01)
     assert np.isnan(pitch_curve(np.zeros(16000, np.float32), 16000)).all()
     assert np.isnan(pitch_curve(np.random.default_rng(0).normal(size=16000) * 0.1, 16000)).mean() > 0.9
 

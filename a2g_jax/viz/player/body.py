@@ -1,4 +1,4 @@
-"""A drawable body over any skeleton: a person where arms are found by name, plain capsules otherwise."""
+"""A drawable body for any skeleton: a person where two arms are found, plain capsules otherwise."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from a2g_jax.viz.player.roles import find_roles, is_finger, rest_positions
 
 
 def build_body(skeleton: Skeleton) -> Body:
-    """The body to draw for ``skeleton``: a mannequin where arms are found by name, plain capsules otherwise."""
+    """The body to draw for ``skeleton``: a mannequin where two arms are found, plain capsules otherwise."""
     body = Body(points=[(joint, (0.0, 0.0, 0.0)) for joint in range(skeleton.joints)])
     ends: dict[int, int] = {}
     for joint, offset in skeleton.ends:
@@ -34,7 +34,7 @@ def build_body(skeleton: Skeleton) -> Body:
 
 
 def _generic(body: Body, skeleton: Skeleton, drawn: set[int], size: float) -> None:
-    """A capsule for every bone that has none yet."""
+    """Add a capsule for every bone without one."""
     lengths = np.linalg.norm(np.asarray(skeleton.offsets), axis=1)
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0 and joint not in drawn:
@@ -52,5 +52,5 @@ def _bone(body: Body, parent: int, joint: int, length: float, size: float, finge
 
 
 def _leaves(skeleton: Skeleton) -> tuple[int, ...]:
-    """The two joints farthest from the root: a guess at hands for a tree without names."""
+    """The two joints farthest from the root: a guess at the hands of an unknown tree."""
     return tuple(sorted(np.argsort(-np.linalg.norm(rest_positions(skeleton), axis=1))[:2].tolist()))

@@ -1,4 +1,4 @@
-"""Motion and sound as text: 16-bit numbers in base64, for a page without other files."""
+"""Motion and audio as 16-bit numbers in base64, for a page without other files."""
 
 import base64
 import struct
@@ -13,10 +13,10 @@ _FINEST = 1e-5
 
 
 def encode_positions(points: Float[np.ndarray, "T P 3"], label: str) -> dict:
-    """Quantise positions to 16 bits over the range that each axis needs.
+    """Quantise positions to 16 bits over the range of each axis.
 
     Returns:
-        ``low`` and ``step`` (one number an axis, metres) and ``data``: base64 of little-endian unsigned 16-bit numbers
+        ``low`` and ``step`` (one number per axis, metres) and ``data``: base64 of little-endian unsigned 16-bit numbers
         ``q`` in the order of ``points``, with ``position = low + step * q``. The error is half a step: 0.03 mm for a
         speaker on a spot of 4 m, and never more than 0.5 mm.
     """
@@ -24,9 +24,7 @@ def encode_positions(points: Float[np.ndarray, "T P 3"], label: str) -> dict:
         raise InputError(f"figure {label!r}: the motion has no frames; give it at least one.")
     if not np.isfinite(points).all():
         frame = int(np.argwhere(~np.isfinite(points))[0, 0])
-        raise InputError(
-            f"figure {label!r}, frame {frame}: a position is not a finite number; repair the motion first."
-        )
+        raise InputError(f"figure {label!r}, frame {frame}: a position is not a finite number; fix the motion first.")
     flat = points.reshape(-1, 3).astype(np.float64)
     low, high = flat.min(axis=0), flat.max(axis=0)
     step = np.maximum((high - low) / _FULL, _FINEST)
@@ -50,8 +48,8 @@ def encode_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> str:
     if sample_rate <= 0:
         raise InputError(f"audio: the sample rate is {sample_rate}; give samples per second.")
     if not np.isfinite(audio).all():
-        place = int(np.argwhere(~np.isfinite(audio))[0, 0])
-        raise InputError(f"audio, sample {place}: not a finite number; repair the audio first.")
+        sample = int(np.argwhere(~np.isfinite(audio))[0, 0])
+        raise InputError(f"audio, sample {sample}: not a finite number; fix the audio first.")
     samples = np.round(np.clip(audio, -1.0, 1.0) * 32767.0).astype("<i2").tobytes()
     form = struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, sample_rate, 2 * sample_rate, 2, 16)
     data = struct.pack("<4sI", b"data", len(samples)) + samples

@@ -1,4 +1,4 @@
-"""What the page shows: motions with their labels, and lanes of time under the waveform."""
+"""Contents of the page: motions with their labels, and lanes of the timeline."""
 
 from dataclasses import dataclass
 
@@ -29,8 +29,7 @@ class Track:
 class Bars:
     """A lane of bars, such as syllables as high as their accent.
 
-    Each bar is ``(start, end, height, text, note)``: seconds, 0 to 1, what is written in it, and what pointing at it
-    tells besides.
+    Each bar is ``(start, end, height, text, note)``: seconds, 0 to 1, the label, and further text of the tooltip.
     """
 
     name: str
@@ -68,17 +67,17 @@ class Mark:
     hand: str
     """``left``, ``right`` or ``both``."""
     key: str
-    """Picks the colour and names it: ``beat``, ``offer``, ``sweep``, ``point``, ``list``, ``frame``, or any other."""
+    """Colour and name: ``beat``, ``offer``, ``sweep``, ``point``, ``list``, ``frame``, or any other."""
     note: str = ""
-    """What pointing at it tells besides."""
+    """Further text of the tooltip."""
 
 
 @dataclass(frozen=True)
 class Hands:
     """A lane with the gesture phases of both hands, left above right, and marks on them.
 
-    Phases are ``(start, end, phase)`` in seconds, drawn as what they are: ``preparation`` rises, ``stroke`` is full,
-    ``hold`` is level, ``retraction`` falls, ``rest`` is a line. The phase of the moment is also written under the
+    Phases are ``(start, end, phase)`` in seconds, drawn by their kind: ``preparation`` rises, ``stroke`` is full,
+    ``hold`` is level, ``retraction`` falls, ``rest`` is a line. The current phase is also written under the
     figure, with the mark's key during a stroke.
     """
 

@@ -1,4 +1,4 @@
-"""Hands to draw: fingers where the skeleton has them, a relaxed hand where it ends at the wrist."""
+"""Drawable hands: the fingers of the skeleton, or a relaxed hand where it ends at the wrist."""
 
 from dataclasses import dataclass
 
@@ -15,16 +15,16 @@ _KNUCKLES = {
     "pinky": ((-0.035, 0.075), (0.034, 0.019, 0.018)),
 }
 _CURL = {"index": 0.20, "middle": 0.26, "ring": 0.33, "pinky": 0.38}
-"""How far each joint of a relaxed finger bends, radians; more towards the little finger."""
+"""Flexion of each joint of a relaxed finger, radians; larger towards the little finger."""
 _SPLAY = {"index": 0.05, "middle": 0.0, "ring": -0.04, "pinky": -0.12}
-#: Radii at the knuckle and the three places after it, metres; the little finger is thinner.
+#: Radii at the knuckle, the two joints after it and the tip, metres; the little finger is thinner.
 _FINGER_RADII = (0.0098, 0.0088, 0.0079, 0.0066)
 _THUMB_RADII = (0.0150, 0.0112, 0.0098, 0.0078)
 
 
 @dataclass(frozen=True)
 class Finger:
-    """Joints of one finger from the knuckle (of a thumb: from its base) on."""
+    """Joints of one finger from the knuckle, or of a thumb from its base."""
 
     joints: tuple[int, ...]
     thumb: bool
@@ -33,10 +33,10 @@ class Finger:
 
 
 def find_fingers(skeleton: Skeleton, wrist: int, rest: Float[np.ndarray, "J 3"]) -> list[Finger]:
-    """The fingers below ``wrist``: all five or more bones of a hand, or none where the rig has mere stubs.
+    """The fingers below ``wrist``; an empty list where the rig has fewer than three.
 
     Fingers are the chains of two joints or more that start at the wrist or at a bone of the palm. The thumb is found
-    by name, else it is the chain that points most away from the others.
+    by name, otherwise it is the chain that points most away from the others.
     """
     children: dict[int, list[int]] = {}
     for joint, parent in enumerate(skeleton.parents):
@@ -55,9 +55,9 @@ def find_fingers(skeleton: Skeleton, wrist: int, rest: Float[np.ndarray, "J 3"])
     if len(chains) < 3:
         return []
     names = [skeleton.names[chain[-1]].lower() for chain in chains]
-    ways = np.array([_unit(rest[chain[-1]] - rest[chain[0]]) for chain in chains])
+    directions = np.array([_unit(rest[chain[-1]] - rest[chain[0]]) for chain in chains])
     named = [index for index, name in enumerate(names) if "thumb" in name]
-    thumb = named[0] if named else int(np.argmin(ways @ ways.sum(axis=0)))
+    thumb = named[0] if named else int(np.argmin(directions @ directions.sum(axis=0)))
     away = np.linalg.norm(rest[[chain[-1] for chain in chains]] - rest[chains[thumb][-1]], axis=1)
     small = int(np.argmax(away))
     fingers = []
@@ -76,8 +76,8 @@ def finger_radii(finger: Finger, size: float) -> list[float]:
     """Radii at the joints of a finger and at its tip, metres."""
     table = _THUMB_RADII if finger.thumb else _FINGER_RADII
     share = size * (0.85 if finger.small else 1.0)
-    places = np.linspace(0.0, 3.0, len(finger.joints) + 1)
-    return [float(radius) * share for radius in np.interp(places, range(4), table)]
+    stations = np.linspace(0.0, 3.0, len(finger.joints) + 1)
+    return [float(radius) * share for radius in np.interp(stations, range(4), table)]
 
 
 def relaxed_hand(size: float, palm_side: float) -> list[tuple[np.ndarray, list[float], bool]]:

@@ -1,4 +1,4 @@
-"""The parts of a person, placed on whatever joints a skeleton has."""
+"""The parts of a person, placed on the joints of a skeleton."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ class Mannequin:
         self.body, self.skeleton, self.roles, self.ends = body, skeleton, roles, ends
         self.rest = rest_positions(skeleton)
         self.drawn: set[int] = set()
-        """Joints whose bone to their parent needs no capsule of its own."""
+        """Joints whose bone to the parent needs no capsule of its own."""
         arms = [self._length(limb) / 0.51 for limb in roles.arms.values()]
         legs = [self._length(limb) / 0.80 for limb in roles.legs.values()]
         self.size = float(np.mean(arms + legs)) or 1.0
@@ -42,7 +42,7 @@ class Mannequin:
         return path
 
     def torso(self) -> None:
-        """Chest, belly and hips, dressed; shoulders and the muscles from there to the neck."""
+        """Chest, belly and hips with clothes; shoulders and the muscles from there to the neck."""
         body, roles, size, rest = self.body, self.roles, self.size, self.rest
         left, right = roles.arms["left"].top, roles.arms["right"].top
         top = roles.neck if roles.neck is not None else left
@@ -75,7 +75,7 @@ class Mannequin:
             self.drawn.update(self._path(joint, roles.pelvis))
 
     def hips(self) -> Anchor:
-        """The upper part of the trousers; returns where the shirt comes out of them."""
+        """Add the upper part of the trousers; returns the anchor where the shirt begins."""
         body, roles, size, rest = self.body, self.roles, self.size, self.rest
         hips = [roles.legs[side].top for side in ("left", "right")]
         pelvis = body.frame(roles.pelvis, roles.chest, hips[0], hips[1])
@@ -90,7 +90,7 @@ class Mannequin:
         return (pelvis, 0, 0.065 * size, 0)
 
     def head(self) -> None:
-        """Neck, skull and jaw, hair, and a face that shows from afar where the head looks."""
+        """Add neck, skull and jaw, hair, and a face that shows the direction of the head from afar."""
         body, roles, size = self.body, self.roles, self.size
         if roles.head is None or roles.neck is None:
             return
@@ -123,13 +123,13 @@ class Mannequin:
             part(at(sign * 0.019, 0.0905, 0.0815), at(sign * 0.043, 0.0945, 0.0735), (0.0036, 0.0032), "hair")
 
     def head_frame(self, head: int) -> tuple[int, float]:
-        """A frame with the crown above the head's joint, and how far above, metres."""
+        """A frame at the head's joint, and the height of the crown above it, metres."""
         body, size = self.body, self.size
         up = self.up
         top = 0.205 * size
         end = self.ends.get(head)
         if end is None:
-            # Some rigs carry the top of the head as a joint ("HeadEnd").
+            # Some rigs have the top of the head as a joint ("HeadEnd").
             end = next((j for j in self._under(head) if "end" in self.skeleton.names[j].lower()), None)
         if end is not None:
             offset = (
@@ -147,7 +147,7 @@ class Mannequin:
         return body.frame(head, end, body.point(head, left * 0.1 * size), head), top
 
     def arm(self, side: str, arm: Limb) -> None:
-        """Sleeves and a hand."""
+        """Add sleeves and a hand."""
         body, size = self.body, self.size
         body.add((arm.top,), (arm.middle,), (0.055 * size, 0.043 * size), shades=True)
         body.add((arm.middle,), (arm.tip,), (0.043 * size, 0.031 * size), shades=True)
@@ -180,7 +180,7 @@ class Mannequin:
         self.hand(frame, palm_side, digits)
 
     def hand(self, frame: int, palm_side: float, digits: list[tuple[list[Anchor], list[float], bool]]) -> None:
-        """A wrist, the bones of the palm to each knuckle, the ball of the thumb, and the fingers."""
+        """Add a wrist, the bones of the palm to each knuckle, the ball of the thumb, and the fingers."""
         body, size = self.body, self.size
 
         def at(x: float | int, y: float | int, z: float | int) -> Anchor:
@@ -210,6 +210,7 @@ class Mannequin:
         return self.body.point(last, before * min(0.85, 0.022 * self.size / max(float(np.linalg.norm(before)), 1e-6)))
 
     def leg(self, leg: Limb) -> None:
+        """Add a trouser leg and a shoe."""
         body, size, rest = self.body, self.size, self.rest
         other = next(limb.top for limb in self.roles.legs.values() if limb.top != leg.top)
         body.add((leg.top, other, self.inset), (leg.middle,), (0.086 * size, 0.058 * size), tint="legs", shades=True)

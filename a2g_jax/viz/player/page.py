@@ -1,4 +1,4 @@
-"""Write the page: template, data and sound in one HTML file that needs no network."""
+"""The page: template, data and audio in one HTML file that needs no network."""
 
 import html
 import json
@@ -18,7 +18,7 @@ from a2g_jax.viz.player.encode import encode_audio, encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.stage import body_points, placement
 
-#: Parts of the script, in the order in which they stand in the page.
+#: Parts of the script, in their order in the page.
 _SCRIPTS = (
     "math",
     "figures",
@@ -48,19 +48,19 @@ def write_page(
 ) -> None:
     """Write one self-contained HTML file that plays the figures side by side, in sync with the audio.
 
-    The page works from disk in any browser with WebGL 2 (or, more plainly, a 2D canvas), asks no server for anything,
+    The page works from disk in any browser with WebGL 2 (or, with a plainer picture, a 2D canvas), makes no requests,
     and follows the reader's light or dark theme. Figures may differ in skeleton, frame rate and length; all start at
     time zero of the audio, and one that ends before the audio holds its last frame.
 
     Args:
-        path: the file to write, replaced as a whole.
+        path: the file to write; replaced atomically.
         figures: at least one.
-        audio: mono samples in -1 to 1; none at all gives a silent page as long as the longest motion.
+        audio: mono samples in -1 to 1; empty for a silent page as long as the longest motion.
         sample_rate: of the audio, samples per second.
         title: heading, also the name of the browser tab.
         subtitle: a line under the heading.
         words: spoken words, written under the waveform.
-        lanes: what else is known about the speech, drawn under the words; each figure's own lanes come after them.
+        lanes: further lanes of the speech, drawn under the words and above those of the figures.
         footer: a line at the foot of the page.
 
     Raises:
@@ -91,12 +91,12 @@ def write_page(
 
 
 def fill_template(template: str, values: dict[str, str]) -> str:
-    """Replace each ``{{name}}`` by its value, in one pass, so that nothing inside a value is ever replaced."""
+    """Replace each ``{{name}}`` by its value, in one pass, so that nothing inside a value is replaced."""
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found.group(1)], template)
 
 
 def script_json(value: dict) -> str:
-    """JSON that is safe inside a script element: no ``<``, ``>`` or ``&`` whatever the strings hold."""
+    """JSON that is safe inside a script element: without ``<``, ``>`` or ``&`` in any string."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")

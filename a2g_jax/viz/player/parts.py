@@ -1,6 +1,6 @@
-"""What a drawable body is made of: points that move with the joints, and capsules between them.
+"""Parts of a drawable body: points that move with the joints, and capsules between them.
 
-The page knows no skeletons. It gets world positions of points and a list of shapes; everything that depends on names,
+The page has no skeletons: it gets world positions of points and a list of shapes. Everything that depends on names,
 proportions and the rest pose is decided in :mod:`~a2g_jax.viz.player.body`.
 """
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-#: How an anchor names its place: a point ``(p,)``, between two points ``(p, q, weight)``, or metres along the axes of
-#: a frame ``(frame, x, y, z)``.
+#: A location: a point ``(p,)``, between two points ``(p, q, weight)``, or metres along the axes of a frame
+#: ``(frame, x, y, z)``.
 Anchor = tuple[float | int, ...]
 
 
@@ -29,7 +29,7 @@ class Shape:
     flat: float = 1.0
     """Thickness along the axis, as a fraction of the radius."""
     shades: bool = False
-    """Whether it casts soft ambient shadow on the rest of the body."""
+    """Whether it casts a soft ambient shadow on the rest of the body."""
 
     def encoded(self) -> list:
         """As JSON for the page."""
@@ -65,5 +65,5 @@ class Body:
 
 
 def short(numbers) -> list:
-    """Numbers as JSON keeps them small: whole ones as integers, the others with five decimals."""
+    """Numbers for compact JSON: whole ones as integers, others with five decimals."""
     return [int(number) if float(number).is_integer() else round(float(number), 5) for number in numbers]

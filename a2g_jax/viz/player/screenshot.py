@@ -1,4 +1,4 @@
-"""Pictures of a page, taken by a browser without a window."""
+"""Pictures of a page, by a headless browser."""
 
 import os
 import shutil
@@ -8,7 +8,7 @@ from typing import Any
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path, check_readable
 
-#: Software WebGL, so that pictures are the same with and without a GPU, and no traffic of the browser's own.
+#: Software WebGL, so that pictures are the same with and without a GPU, and no network traffic of the browser itself.
 BROWSER_ARGUMENTS: tuple[str, ...] = (
     "--no-sandbox",
     "--use-gl=angle",
@@ -32,7 +32,7 @@ def find_browser() -> str | None:
 
 
 def _settled(view: Any) -> bytes:
-    """A picture that the next one equals: on a busy machine canvases reach the screen frames after they were drawn."""
+    """A picture that equals the next one: on a busy machine canvases appear frames after they are drawn."""
     before, after = b"", view.screenshot(type="png")
     for _ in range(20):
         if before == after:
@@ -56,15 +56,15 @@ def screenshot_page(
 
     Args:
         page: the HTML file.
-        picture: the PNG to write, replaced as a whole.
-        width: of the window, pixels.
-        height: of the window, pixels.
+        picture: the PNG to write; replaced atomically.
+        width: width of the window, pixels.
+        height: height of the window, pixels.
         time: seconds from the start.
-        dark: dark theme instead of light.
+        dark: whether to use the dark theme.
         script: JavaScript to run first, such as ``a2gPlayer.view({yaw: 0.6})``.
 
     Raises:
-        InputError: no such page, or playwright or Chromium is missing.
+        InputError: no such page, or no Playwright or Chromium.
     """
     source = check_readable(page, "an HTML page")
     try:
@@ -73,7 +73,7 @@ def screenshot_page(
         raise InputError("pictures of a page need playwright; install it with: pip install playwright") from None
     browser_path = find_browser()
     if browser_path is None or not Path(browser_path).exists():
-        raise InputError("pictures of a page need Chromium; install it, or name it in the variable A2G_CHROMIUM.")
+        raise InputError("pictures of a page need Chromium; install it, or set A2G_CHROMIUM to its path.")
     with atomic_path(picture) as temporary, sync_playwright() as playwright:
         try:
             browser = playwright.chromium.launch(executable_path=browser_path, args=list(BROWSER_ARGUMENTS))

@@ -1,4 +1,4 @@
-"""Where a figure stands on the page's stage: the place under it, the floor, which way is its front, how large it is."""
+"""Placement of a figure on the stage: ground point, floor, heading and size."""
 
 import numpy as np
 from jaxtyping import Float
@@ -7,9 +7,9 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.viz.player.body import Body
 from a2g_jax.viz.player.roles import find_roles
 
-#: A figure whose mean front is within this angle (radians) of +Z keeps its own heading.
+#: A figure whose mean heading is within this angle (radians) of +Z is not turned.
 _KEEP_HEADING = 0.6
-#: A floor within this distance (metres) of height zero is taken to be at zero, so that floating feet can be seen.
+#: A floor within this distance (metres) of height zero counts as zero, so that floating feet are visible.
 _KEEP_FLOOR = 0.12
 
 
@@ -38,7 +38,7 @@ def placement(motion: Motion, points: Float[np.ndarray, "T P 3"]) -> dict:
     heading = 0.0
     if roles is not None:
         across = points[:, roles.arms["left"].top] - points[:, roles.arms["right"].top]
-        # Front is left x up: across rotated by a quarter turn about +Y.
+        # Front is left x up: ``across`` rotated by a quarter turn about +Y.
         front = np.stack([-across[:, 2], across[:, 0]], axis=1).mean(axis=0)
         angle = float(np.arctan2(front[0], front[1]))
         if np.linalg.norm(front) > 0.02 and abs(angle) > _KEEP_HEADING:

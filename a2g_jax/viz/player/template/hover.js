@@ -1,4 +1,4 @@
-// The box beside the pointer that tells exact values, and the legend of what is drawn.
+// The tooltip with exact values, and the legend.
 
 class Hover {
   constructor(timeline) {
@@ -28,7 +28,7 @@ class Hover {
   hide() { this.box.hidden = true; }
 }
 
-// Only what the page's lanes hold comes into the legend.
+// The legend has only what is in the page's lanes.
 function fillLegend(player) {
   const legend = document.getElementById("legend"), tracks = player.figures.flatMap((figure) => figure.tracks).filter((track) => kindOf(track) === "hands");
   legend.hidden = !tracks.length;
@@ -39,9 +39,9 @@ function fillLegend(player) {
     part.append(text);
     legend.append(part);
   };
-  const seen = new Set(tracks.flatMap((track) => [...track.left, ...track.right].map((span) => span[2])));
+  const phases = new Set(tracks.flatMap((track) => [...track.left, ...track.right].map((span) => span[2])));
   for (const [phase, [a, b]] of Object.entries(PHASES)) {
-    if (!seen.has(phase)) continue;
+    if (!phases.has(phase)) continue;
     const solid = { stroke: 0.9, hold: 0.55, rest: 1 }[phase] || 0.35;
     item(phase, a + b > 0 ? `d="M0 12V${12 - 11 * a}L20 ${12 - 11 * b}V12z" opacity="${solid}"` : 'd="M0 11h20v1H0z"');
   }

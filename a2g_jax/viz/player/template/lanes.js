@@ -1,4 +1,4 @@
-// Lanes of the timeline. A kind of lane says how tall it is, draws itself into the strip, and tells what is at a place.
+// Lanes of the timeline. Each kind of lane has a height, draws itself into the strip, and has a tooltip for a position.
 // `compact`: several figures are shown, so each lane gets less room.
 
 const SMALL = "11px system-ui, sans-serif";
@@ -93,7 +93,7 @@ const LANES = {
     },
   },
 
-  // Left hand above, right hand below; each phase has the shape of what the hand does.
+  // Left hand above, right hand below; the shape of each phase shows its kind.
   hands: {
     height: (compact) => (compact ? 34 : 62),
     half(compact) { return (this.height(compact) - 6) / 2; },
@@ -134,7 +134,7 @@ const LANES = {
   },
 };
 
-// What both hands of a figure do at a moment: "L hold", "R stroke · beat".
+// The phases of both hands of a figure at a moment: "L hold", "R stroke · beat".
 function doing(figure, time) {
   const lane = figure.tracks.find((track) => kindOf(track) === "hands");
   if (!lane) return null;

@@ -54,9 +54,9 @@ function placeCamera(band, camera) {
   const bounds = (pitch, distance) => {
     const target = [0, frame.tall / 2, 0], eye = [0, target[1] + distance * Math.sin(pitch), distance * Math.cos(pitch)];
     const m = multiply(perspective(FIELD, aspect, 0.05, 100, 0, 0), lookAt(eye, target, [0, 1, 0]));
-    const seen = corners.map((corner) => project(m, corner));
-    const wide = Math.max(...seen.map((p) => (p[2] > 0.1 ? Math.abs(p[0]) : 99)));
-    return { wide, low: Math.min(...seen.map((p) => p[1])), high: Math.max(...seen.map((p) => p[1])), eye, target };
+    const projected = corners.map((corner) => project(m, corner));
+    const wide = Math.max(...projected.map((p) => (p[2] > 0.1 ? Math.abs(p[0]) : 99)));
+    return { wide, low: Math.min(...projected.map((p) => p[1])), high: Math.max(...projected.map((p) => p[1])), eye, target };
   };
   let near = 0.5, far = 80;
   for (let i = 0; i < 40; i++) {

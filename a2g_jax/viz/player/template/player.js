@@ -110,8 +110,8 @@ class Player {
       return;
     }
     if (this.audio.seeking || this.audio.readyState < 2) return;
-    const heard = this.audio.currentTime, guess = this.now + (this.audio.paused ? 0 : elapsed * this.rate), off = heard - guess;
-    this.now = clamp(Math.abs(off) > 0.12 * Math.max(1, this.rate) ? heard : guess + 0.15 * off, 0, this.duration);
+    const played = this.audio.currentTime, guess = this.now + (this.audio.paused ? 0 : elapsed * this.rate), off = played - guess;
+    this.now = clamp(Math.abs(off) > 0.12 * Math.max(1, this.rate) ? played : guess + 0.15 * off, 0, this.duration);
   }
 
   // --- picture ---
@@ -231,7 +231,7 @@ class Player {
     });
   }
 
-  // Under each figure, what its hands do.
+  // Under each figure, the phases of its hands.
   showDoing() {
     for (const figure of this.shown()) {
       const label = this.labels[figure.index];
@@ -309,7 +309,7 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
-  // What pointing at a place of the closer timeline tells, in CSS pixels from its corner; lanes from top to bottom.
+  // The tooltip of a position in the detailed timeline, in CSS pixels from its corner; lanes from top to bottom.
   tell: (x, y) => player.timeline.tell(x, y) || null,
   lanes: () => player.timeline.rows().map(({ kind, height, lane, figure }) => ({ kind, height, name: lane ? lane.name : kind, figure: figure ? figure.label : null })),
   // Resolves when a picture of the present moment, at full quality, is on screen.

@@ -181,7 +181,7 @@ class Timeline {
     return figure && this.player.figures.length > 1 ? [figure.label, name].filter(Boolean).join(" · ") : name;
   }
 
-  // What is at a place of the closer look: lines of text, or nothing.
+  // The tooltip of a position in the detailed timeline: lines of text, or nothing.
   tell(x, y) {
     const [from, to] = this.window(), perPixel = (to - from) / Math.max(this.detail.clientWidth, 1), time = from + x * perPixel;
     let top = 4;

@@ -1,6 +1,7 @@
-"""Equal audio or equal motion in two recordings, wherever in them it is, after any gain or re-encoding.
+"""Equal audio or equal motion in two recordings, at any place, after any gain or re-encoding.
 
-Each frame becomes a word of 32 bits, and two recordings are alike where many words agree at one time shift. Audio: the
+Each frame becomes a word of 32 bits; two recordings have a stretch in common where many words agree at one time shift.
+Audio: the
 signs of how the energy differences between neighbouring bands change (Haitsma & Kalker, "A Highly Robust Audio
 Fingerprinting System", ISMIR 2002). Motion: the signs of 32 fixed random projections of how the pose changes in 0.2 s.
 """
@@ -16,26 +17,26 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.inspection.finding import Finding, Place
 
-#: Words a second, of audio and of motion.
+#: Words per second, of audio and of motion.
 AUDIO_RATE, MOTION_RATE = 50.0, 20.0
-#: Windows of 0.26 s, long against the 10 ms that a copy cut elsewhere can be off the frames.
+#: Windows of 0.26 s, long compared with the 10 ms by which a copy cut elsewhere can be off the frames.
 _MEL = MelConfig(window=4096, bands=33, level_db=None, low_hz=300.0, high_hz=4000.0)
-#: A word that occurs more often is silence or rest and tells nothing.
+#: Words that occur more often are ignored: silence or rest.
 _COMMON = 16
-#: Words that must agree at one shift: more than chance brings in 10 s, fewer than a copy of 10 s has.
+#: Words that must agree at one shift: more than by chance in 10 s, fewer than in a copy of 10 s.
 _AGREEING = 24
-#: Share of the words between the first and the last that agree: gestures alike share a few words in a row.
+#: Least share of agreeing words between the first and the last: similar gestures share a few words in a row.
 _DENSE = 0.1
-#: A pose changes by less than this share of its usual change while it rests; signs are noise then.
+#: At rest a pose changes by less than this share of its root-mean-square change; signs are noise then.
 _RESTING = 0.2
-#: Seconds over which energies, and poses, are compared.
+#: Time differences of energies, and of poses, seconds.
 _APART, _POSES_APART = 0.1, 0.2
 _BITS = (np.uint32(1) << np.arange(32, dtype=np.uint32)).astype(np.uint32)
 
 
 @dataclass(frozen=True)
-class Print:
-    """The words of one recording."""
+class Fingerprint:
+    """The words of a recording."""
 
     words: UInt32[np.ndarray, " K"]
     frames: np.ndarray
@@ -43,40 +44,40 @@ class Print:
     rate: float
 
     @classmethod
-    def of(cls, bits: np.ndarray, telling: np.ndarray, rate: float) -> "Print":
-        """From bits (T, 32), of which the frames count that are telling."""
+    def of(cls, bits: np.ndarray, valid: np.ndarray, rate: float) -> "Fingerprint":
+        """The words of bits (T, 32) at the valid frames."""
         words = (bits.astype(np.uint32) * _BITS).sum(axis=1, dtype=np.uint32)
-        frames = np.flatnonzero(telling)
+        frames = np.flatnonzero(valid)
         return cls(words[frames], frames, rate)
 
 
 @dataclass(frozen=True)
 class Copy:
-    """Two recordings that have a stretch in common."""
+    """A stretch that two recordings have in common."""
 
     first: int
     second: int
     start: float
-    """Seconds into the first recording where it begins."""
+    """Its start in the first recording, seconds."""
     shift: float
-    """Seconds by which it comes later in the second."""
+    """Seconds by which it is later in the second."""
     seconds: float
 
 
-def audio_print(audio: Float[np.ndarray, " N"], sample_rate: int) -> Print:
+def audio_fingerprint(audio: Float[np.ndarray, " N"], sample_rate: int) -> Fingerprint:
     """The words of a speech recording."""
     if sample_rate != _MEL.sample_rate:
         import soxr
 
         audio = np.asarray(soxr.resample(audio, sample_rate, _MEL.sample_rate), np.float32)
     frames = int(len(audio) / _MEL.sample_rate * AUDIO_RATE)
-    return bands_print(log_mel(audio, _MEL, AUDIO_RATE, frames), AUDIO_RATE)
+    return bands_fingerprint(log_mel(audio, _MEL, AUDIO_RATE, frames), AUDIO_RATE)
 
 
-def bands_print(bands: Float[np.ndarray, "T B"], rate: float) -> Print:
+def bands_fingerprint(bands: Float[np.ndarray, "T B"], rate: float) -> Fingerprint:
     """The words of log-mel rows, of any number of bands."""
     if len(bands) <= _APART * rate + 1:
-        return Print(np.zeros(0, np.uint32), np.zeros(0, np.int64), rate)
+        return Fingerprint(np.zeros(0, np.uint32), np.zeros(0, np.int64), rate)
     if bands.shape[1] != 33:
         at = np.linspace(0, bands.shape[1] - 1, 33)
         low = np.minimum(at.astype(int), bands.shape[1] - 2)
@@ -86,16 +87,16 @@ def bands_print(bands: Float[np.ndarray, "T B"], rate: float) -> Print:
     across, apart = np.diff(bands, axis=1), max(1, round(_APART * rate))
     change = across[apart:] - across[:-apart]
     loud = bands[: len(change)].max(axis=1) > bands.max() - 30
-    return Print.of(change > 0, loud, rate)
+    return Fingerprint.of(change > 0, loud, rate)
 
 
-def motion_print(motion: Motion | PoseTrack) -> Print:
+def motion_fingerprint(motion: Motion | PoseTrack) -> Fingerprint:
     """The words of a motion."""
     values = motion.values if isinstance(motion, PoseTrack) else np.asarray(motion.rotations)[..., :2]
-    return poses_print(values.reshape(len(values), -1), motion.fps)
+    return poses_fingerprint(values.reshape(len(values), -1), motion.fps)
 
 
-def poses_print(poses: Float[np.ndarray, "T F"], fps: float) -> Print:
+def poses_fingerprint(poses: Float[np.ndarray, "T F"], fps: float) -> Fingerprint:
     """The words of rows of pose values: rotations, positions or directions."""
     count = int(len(poses) / fps * MOTION_RATE)
     where = np.minimum(np.arange(count) * fps / MOTION_RATE, max(len(poses) - 1, 0))
@@ -108,11 +109,11 @@ def poses_print(poses: Float[np.ndarray, "T F"], fps: float) -> Print:
     directions = np.random.default_rng(2002).normal(size=(poses.shape[1], 32)).astype(np.float32)
     size = np.linalg.norm(change, axis=1)
     moving = size > _RESTING * np.sqrt(np.mean(size**2)) if len(size) else np.zeros(0, bool)
-    return Print.of(change @ directions > 0, moving & (size > 1e-6), MOTION_RATE)
+    return Fingerprint.of(change @ directions > 0, moving & (size > 1e-6), MOTION_RATE)
 
 
-def find_copies(prints: Sequence[Print]) -> list[Copy]:
-    """Pairs of recordings with a stretch in common, one for each pair."""
+def find_copies(prints: Sequence[Fingerprint]) -> list[Copy]:
+    """Common stretches, one for each pair of recordings that has any."""
     if len(prints) < 2:
         return []
     words = np.concatenate([one.words for one in prints])
@@ -152,14 +153,14 @@ def find_copies(prints: Sequence[Print]) -> list[Copy]:
 
 
 def check_copies(
-    what: str, prints: Sequence[Print], names: Sequence[str], splits: Sequence[frozenset[str]] | None = None
+    what: str, prints: Sequence[Fingerprint], names: Sequence[str], splits: Sequence[frozenset[str]] | None = None
 ) -> list[Finding]:
     """Recordings with equal audio, or equal motion; a leak where they are in two splits.
 
     Args:
         what: ``"audio"`` or ``"motion"``.
-        names: of the recordings.
-        splits: parts that each recording lies in.
+        names: names of the recordings.
+        splits: splits that each recording is part of.
     """
     findings = []
     for copy in find_copies(prints):
@@ -170,11 +171,11 @@ def check_copies(
         parts = (splits[copy.first], splits[copy.second]) if splits else (frozenset[str](), frozenset[str]())
         if splits and parts[0] and parts[1] and len(parts[0] | parts[1]) > 1:
             message += f", and they are in different splits ({_join(parts[0])}; {_join(parts[1])})."
-            mend = "Put both into one split; a test on what was trained on says nothing."
-            findings.append(Finding("warning", "leak", message, mend, place, copy.seconds))
+            fix = "Put both into one split; otherwise the model is tested on training data."
+            findings.append(Finding("warning", "leak", message, fix, place, copy.seconds))
         else:
-            mend = "Remove one, unless both are meant to be there."
-            findings.append(Finding("warning", "duplicate", f"{message}.", mend, place, copy.seconds))
+            fix = "Remove one, unless both are meant to be there."
+            findings.append(Finding("warning", "duplicate", f"{message}.", fix, place, copy.seconds))
     return findings
 
 

@@ -1,4 +1,4 @@
-"""How likely a flow finds a motion: injected glitches rank lowest, and what ``a2g inspect --score`` says of them."""
+"""Log-likelihood of motions by a flow: injected glitches rank lowest, and ``a2g inspect --score`` reports them."""
 
 import json
 from dataclasses import replace
@@ -11,12 +11,12 @@ from a2g_jax.cli import main
 from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.likelihood import compiled_score
+from a2g_jax.evaluation.likelihood import compiled_log_likelihood
 from a2g_jax.features.mel import MelConfig, log_mel
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.pose_track import represent
-from a2g_jax.inspection import likelihood as score_module
-from a2g_jax.inspection.likelihood import score_motion
+from a2g_jax.inspection import likelihood as likelihood_module
+from a2g_jax.inspection.likelihood import motion_likelihood
 from a2g_jax.inspection.unlikely import acceleration_changes, unlikely_moments
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
@@ -52,7 +52,7 @@ TRAINING = TrainConfig(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A flow that has seen a minute of one speaker for a moment."""
+    """A flow trained for a moment on a minute of one speaker."""
     out = tmp_path_factory.mktemp("scored")
     features = Features(fps=20.0, pose="exponential", mel=MelConfig(bands=4))
     rows = (prepare_recording(talk(12.0, seed, speaker="ada", name=f"take{seed}"), features) for seed in range(6))
@@ -69,7 +69,7 @@ def run(folder):
 
 @pytest.fixture(scope="module")
 def take():
-    """A recording of the same speaker that no training has seen."""
+    """A recording of the same speaker that is not in the corpus."""
     return talk(20.0, 77, speaker="ada", name="held")
 
 
@@ -91,11 +91,11 @@ def files(take, tmp_path):
 @pytest.mark.parametrize("name", list(GLITCHES))
 def test_injected_glitches_are_unlikely(run, take, motion, name, frame):
     wrong, where = GLITCHES[name](motion, frame)
-    found = score_motion(run, wrong, take.audio)
+    found = motion_likelihood(run, wrong, take.audio)
     values = found.log_likelihood
     percent = np.array([100 * np.mean(values < value) for value in values[where.start - 3 : where.stop - 3]])
     if name == "frozen":
-        # Standing still for a moment is likely; that it ends in a jump is not. So little training sees it dimly.
+        # Standing still for a moment is likely, the jump at its end is not; a model trained so briefly shows it weakly.
         assert percent[-1] == percent.min()
         assert percent[-1] < 25 < np.median(percent)
     else:
@@ -103,28 +103,28 @@ def test_injected_glitches_are_unlikely(run, take, motion, name, frame):
     if name in ("flipped wrist", "jitter"):
         first = found.moments[0]
         assert where.start <= first.frame < where.stop
-        assert first.deviations > 2 * score_module.WARN
+        assert first.deviations > 2 * likelihood_module.WARN
         assert name == "jitter" or first.joints == ("L_Wrist",)
 
 
-def test_a_clean_motion_has_no_warning_and_always_the_same_score(run, take, motion):
-    found = score_motion(run, motion, take.audio)
-    assert max(moment.deviations for moment in found.moments) < score_module.WARN
+def test_a_clean_motion_has_no_warning_and_always_the_same_likelihood(run, take, motion):
+    found = motion_likelihood(run, motion, take.audio)
+    assert max(moment.deviations for moment in found.moments) < likelihood_module.WARN
     assert len(found.log_likelihood) == motion.frames - 3
     np.testing.assert_allclose(found.seconds[[0, -1]], [3 / 20, (motion.frames - 1) / 20])
-    np.testing.assert_array_equal(score_motion(run, motion, take.audio).log_likelihood, found.log_likelihood)
+    np.testing.assert_array_equal(motion_likelihood(run, motion, take.audio).log_likelihood, found.log_likelihood)
 
 
 def test_windows_are_one_pass(run, take, motion, monkeypatch):
-    monkeypatch.setattr(score_module, "WINDOW", 64)
-    found = score_motion(run, motion, take.audio)
+    monkeypatch.setattr(likelihood_module, "WINDOW", 64)
+    found = motion_likelihood(run, motion, take.audio)
     config = run.config
-    heard = config.statistics["audio"].normalise(log_mel(take.audio, config.mel, config.fps, motion.frames + 2))
+    features = config.statistics["audio"].normalise(log_mel(take.audio, config.mel, config.fps, motion.frames + 2))
     pose = np.pad(represent(motion, "exponential", "")[0], ((0, 2), (0, 0), (0, 0)))
-    whole = np.asarray(compiled_score(run)(heard[None].astype(np.float32), pose[None]))[0]
+    whole = np.asarray(compiled_log_likelihood(run)(features[None].astype(np.float32), pose[None]))[0]
     first = 64 + MODEL.clip_frames
     np.testing.assert_allclose(found.log_likelihood[:first], whole[:first], rtol=1e-3, atol=1e-2)
-    # Later, recurrent layers have begun to read within the motion instead of at its start.
+    # Later, hidden states began within the motion instead of at its start.
     assert np.median(np.abs(found.log_likelihood - whole)) < 0.05 * np.std(whole)
 
 
@@ -150,13 +150,13 @@ def test_another_facing_is_turned_back(run, take, motion):
     about = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]], np.float32)
     rotations = np.array(motion.rotations)
     rotations[:, 0] = about @ rotations[:, 0]
-    plain, turned = (score_motion(run, one, take.audio) for one in (motion, replace(motion, rotations=rotations)))
+    plain, turned = (motion_likelihood(run, one, take.audio) for one in (motion, replace(motion, rotations=rotations)))
     assert plain.turned == 0.0
     np.testing.assert_allclose(abs(turned.turned), 90, atol=20)
     assert np.median(turned.log_likelihood) > np.median(plain.log_likelihood) - 20
 
 
-def test_the_command_line_tells_the_moment(folder, files, tmp_path, capsys):
+def test_the_command_line_reports_the_moment(folder, files, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "score.png"
     arguments = ["inspect", str(folder), "--score", files[0], "--audio", files[1]]
@@ -168,7 +168,7 @@ def test_the_command_line_tells_the_moment(folder, files, tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert main([*arguments, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["kind"] == "score"
+    assert document["kind"] == "likelihood"
     assert document["findings"][0]["place"]["frame"] == 150
     curve = document["facts"]["curve"]
     at = int(np.argmin(curve["log_likelihood"]))
@@ -190,7 +190,7 @@ def test_bad_requests_get_one_line(folder, files, take, motion, run, tmp_path, t
     write_audio(tmp_path / "short.wav", take.audio[: 5 * take.sample_rate], take.sample_rate)
     assert "lasts 20.00 s, but its speech only 5.00 s" in refused(str(folder), "--score", bvh, "--audio", short)
     with pytest.raises(InputError, match="more than the 3"):
-        score_motion(run, motion.clip(0, 3), take.audio)
+        motion_likelihood(run, motion.clip(0, 3), take.audio)
     other = toy_run_config()
-    with pytest.raises(InputError, match="tells no likelihood"):
-        compiled_score(replace(run, config=other))
+    with pytest.raises(InputError, match="has no likelihood"):
+        compiled_log_likelihood(replace(run, config=other))

@@ -1,0 +1,79 @@
+"""Metrics as records: a name, how to read the value, and the function that computes it.
+
+A metric of another package is a :class:`Metric` that its package offers as an entry point of the group
+``a2g_jax.metrics``, or that is named as ``module:name``; no file of this package changes.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, Literal
+
+from a2g_jax.errors import InputError
+from a2g_jax.plugins import entry_points_of, load_object
+
+#: Entry-point group of metrics.
+GROUP = "a2g_jax.metrics"
+
+Scope = Literal["pair", "motion", "clip", "set"]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A metric: how its column is named and read, what it measures, and its function."""
+
+    title: str
+    unit: str
+    better: Literal["lower", "higher", "truth"]
+    """``"truth"``: a value near that of recorded motion is better."""
+    source: str
+    """Paper and equation."""
+    digits: int = 3
+    """Decimals in a table."""
+    _: KW_ONLY
+    key: str = ""
+    """Name in ``report.json``."""
+    measures: str = ""
+    """What is computed, in a sentence."""
+    blind_spots: str = ""
+    """What the value does not show."""
+    scope: Scope = "motion"
+    """What the function gets: ``"pair"`` a :class:`~a2g_jax.metrics.context.PairContext`, compiled with the others of
+    that scope, so it must be traceable by JAX; ``"motion"`` a :class:`~a2g_jax.metrics.context.MotionContext`;
+    ``"clip"`` a :class:`~a2g_jax.metrics.context.ClipContext`; ``"set"`` a
+    :class:`~a2g_jax.metrics.context.SetContext`."""
+    against_target: bool = False
+    """Whether it compares with the recorded motion frame by frame or window by window; a report's first table."""
+    function: Callable[[Any], Any] | None = None
+    """The value for a context; NaN or None where it is not defined."""
+
+    @property
+    def per_sample(self) -> bool:
+        """Whether it is a number for each motion; others are one for a clip or one for a split."""
+        return self.scope in ("pair", "motion")
+
+
+def find_metrics(references: Sequence[str] = (), taken: Sequence[str] = ()) -> tuple[Metric, ...]:
+    """Metrics of installed packages (entry-point group ``a2g_jax.metrics``), then those of the references.
+
+    Args:
+        references: each ``module:name``.
+        taken: keys that they may not have.
+
+    Raises:
+        InputError: one cannot be loaded, is no :class:`Metric`, or has a key that another one has.
+    """
+    names = [(f"metric {name!r}", point.value) for name, point in entry_points_of(GROUP).items()]
+    names += [(f"metric {reference}", reference) for reference in references]
+    found: dict[str, Metric] = {}
+    for name, reference in names:
+        metric = load_object(reference, "metric")
+        if not isinstance(metric, Metric) or metric.function is None or not metric.key:
+            raise InputError(
+                f"{name}: {reference} is no Metric with a key and a function; see a2g_jax.metrics.registry."
+            )
+        if found.get(metric.key) == metric:
+            continue  # named as an entry point and as a reference
+        if metric.key in taken or metric.key in found:
+            raise InputError(f"{name}: there is already a metric with the key {metric.key!r}; choose another key.")
+        found[metric.key] = metric
+    return tuple(found.values())
