@@ -22,10 +22,10 @@ from a2g_jax.data.featurise import prepare_recording
 from a2g_jax.data.settings import Features
 from a2g_jax.evaluation.baselines import with_noise
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.evaluation.scores import METRICS, PER_SAMPLE, Scorer, Target
 from a2g_jax.geometry.mirror import mirror
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.retarget import find_rig
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import atomic_path, make_folder, sha256_file, write_json

@@ -13,10 +13,10 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import baselines as candidates
+from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.evaluation.audit import AudioCondition, listening_audit
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.evaluation.report import BASELINES, describe_metrics
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
 from a2g_jax.evaluation.summary import summarise

@@ -9,9 +9,9 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.evaluation.arrays import Points, Pose
 from a2g_jax.evaluation.emotion_judge import EmotionJudge
 from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.arrays import Points, Pose
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics import pointwise

@@ -1,7 +1,7 @@
 """Motions for a speech of any length, from a trained run."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +18,7 @@ from a2g_jax.training.run import Run
 Audio = Float[np.ndarray, " N"]
 
 
+@runtime_checkable
 class Sampler(Protocol):
     """Plain, edited, pinned and styled generation: different motions for one speech, one after another."""
 

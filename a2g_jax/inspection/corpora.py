@@ -11,7 +11,6 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus, Entry
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
-from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.inspection.audio_checks import check_audio
 from a2g_jax.inspection.copies import Fingerprint, bands_fingerprint, check_copies, poses_fingerprint
 from a2g_jax.inspection.describe import try_rig

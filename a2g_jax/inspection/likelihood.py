@@ -18,7 +18,6 @@ from a2g_jax.evaluation.likelihood import compiled_log_likelihood
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.audio2gestures.pins import face, read_on_skeleton
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.report import Report

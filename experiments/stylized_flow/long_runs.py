@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.generator import Generator
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import write_json
 from a2g_jax.training.run import Run, open_run
 from experiments.tables.records import results

@@ -13,11 +13,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.continuation import continue_clips
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.metrics import beats, diversity, physical
 from a2g_jax.metrics.distribution import frechet_distance
 from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.pointwise import correct_within
 from a2g_jax.training.run import Run
 from experiments.tables.runs import Ruler
 
@@ -89,7 +90,7 @@ def scores_of(
     places = [[space.positions(sample) for sample in clip] for clip in made]
     per_clip: dict[str, list[list[float]]] = {name: [] for name in ("position_l1", "pck", "beat_alignment", "jerk")}
     for clip, target, speech in zip(places, truth, onsets, strict=True):
-        near = body.near(target)
+        near = correct_within(target, space.metres)
         distance = [np.abs(sample - target) for sample in clip]
         per_clip["position_l1"].append([space.scale * float(d.sum(-1).mean()) for d in distance])
         per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])

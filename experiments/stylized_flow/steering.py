@@ -18,7 +18,6 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
@@ -71,7 +70,10 @@ def styles_of(
     """Hand style of every motion."""
     space, generator = corpus.space, Generator(run)
     return np.array(
-        [[hand_style(space.positions(rows), corpus.fps) for rows in generator.rows(one, samples, seed)] for one in features]
+        [
+            [hand_style(space.positions(rows), corpus.fps) for rows in generator.rows(one, samples, seed)]
+            for one in features
+        ]
     )
 
 

@@ -20,7 +20,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style
 from a2g_jax.geometry.pose_track import represent

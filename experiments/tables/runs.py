@@ -12,7 +12,6 @@ from typing import Any
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.evaluate import evaluate
 from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_network
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import write_json
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS

@@ -16,10 +16,9 @@ from a2g_jax.evaluation import baselines as candidates
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge, relevance
 from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
 from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, write_report
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
 from a2g_jax.geometry.rotation import axis_angle_from_matrix
 from a2g_jax.metrics.pointwise import wrist_to_wrist
 from a2g_jax.models import find_model

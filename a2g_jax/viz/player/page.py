@@ -10,9 +10,9 @@ from importlib.resources import files
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
+from a2g_jax.io.words import Word
 from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.encode import encode_audio, encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
