@@ -57,6 +57,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     keep_compilations()
     opened = open_run(options.run)
     trained = replace(opened, config=replace(opened.config, sampling=settings))
+    _ = trained.config.skeleton  # a run on poses without one is refused before any work
     audio = read_audio(options.audio, trained.config.mel.sample_rate)
     chosen = clips.sampler_of(trained, audio, options)
     sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **chosen.about)

@@ -66,7 +66,8 @@ def _load(path: Path, like: TrainState) -> dict[str, Any]:
     (name, optimiser), *_ = like.optimisers.items()
     before = {key: value for key, value in like._asdict().items() if key != "optimisers"}
     tree = dict(ocp.load(path, {**before, "optimiser": optimiser}))
-    return {**tree, "optimisers": {name: tree.pop("optimiser")}}
+    tree["optimisers"] = {name: tree.pop("optimiser")}
+    return tree
 
 
 def _names(path: Path) -> set[str]:

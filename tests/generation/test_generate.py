@@ -66,7 +66,7 @@ def test_no_new_length_compiles_anew(generator):
     for seconds in (1.0, 2.5, 5.9):
         generator.generate(_SPEECH[: int(seconds * 16000)], 1)
     assert generator.engine._sample._cache_size() == compiled == 1
-    assert generator._condition._cache_size() == 1
+    assert generator.engine._condition._cache_size() == 1
 
 
 def test_rotations_are_rotations(generator):

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -67,7 +68,7 @@ def stop_after(config, corpus, out, step):
 
     loop.MetricsLog.tick = tick
     try:
-        with pytest.raises(Interrupted, match="go on with --resume"):
+        with pytest.raises(Interrupted, match="resume with --resume"):
             train(config, corpus, out, resume=False, progress=False)
     finally:
         loop.MetricsLog.tick = original
@@ -241,3 +242,19 @@ def test_killed_at_any_moment_training_ends_the_same(tmp_path, toy_corpus, toy_r
         assert start(tmp_path / "killed").wait() == 0
     assert kills >= 1
     assert equal_trees(load_run(tmp_path / "whole").params, load_run(tmp_path / "killed").params)
+
+
+def test_a_checkpoint_of_version_0_1_resumes(tmp_path, toy_corpus, toy_run_config):
+    """It held the state of one optimiser under another name."""
+    from orbax.checkpoint import v1 as ocp
+
+    whole = train(toy_run_config(), toy_corpus, tmp_path / "whole", resume=False, progress=False)
+    old = tmp_path / "old"
+    stop_after(toy_run_config(), toy_corpus, old, 17)
+    (kept,) = (path for path in (old / "checkpoints").iterdir() if path.name == "17")
+    tree = dict(ocp.load(kept))
+    (tree["optimiser"],) = tree.pop("optimisers").values()
+    shutil.rmtree(old / "checkpoints")
+    ocp.save(kept, tree)
+    resumed = train(toy_run_config(), toy_corpus, old, resume=True, progress=False)
+    assert equal_trees(whole.params, resumed.params)
