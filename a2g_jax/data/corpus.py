@@ -1,8 +1,7 @@
 """A prepared corpus on disk: features and motion at the same frame times, as memory-mapped arrays."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,9 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32
 
+from a2g_jax.data.body_json import body_from_json
+from a2g_jax.data.corpus_layout import FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
+from a2g_jax.data.frame_labels import label_rows, word_rows
 from a2g_jax.data.splits import Segment, Splits
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
@@ -20,44 +22,11 @@ from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import read_json
-from a2g_jax.io.transcripts import words_at_frames
-from a2g_jax.io.words import Word, word_id
-
-FORMAT = "a2g_jax corpus"
-#: Of corpora whose recordings are all stored, and of those that leave most of them to be generated in training.
-VERSION, VERSION_ON_DEMAND = 1, 2
-MANIFEST = "manifest.json"
-#: In a corpus of the second kind: what to generate, part by part.
-PARTS = "parts.json"
-#: The arrays of a corpus, all recordings one after the other: log-mel (N, width), poses (N, R, D), root (N, 3).
-ARRAYS = ("audio.npy", "pose.npy", "root.npy")
-#: The audio itself, where it is kept: 16-bit samples, as many for each recording as its frames last.
-WAVEFORM = "waveform.npy"
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One recording of a corpus."""
-
-    name: str
-    first: int
-    """Row of its first frame in the arrays."""
-    frames: int
-    speaker: str
-    emotion: str
-    sources: dict[str, str]
-    """SHA-256 of each file it was read from."""
-    split: str = ""
-    """Part that the data set's authors put it into, if they did."""
-    first_sample: int = 0
-    """Where its samples begin in the waveform."""
-    samples: int = 0
-    """How many there are; 0 where the corpus keeps none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Corpus:
-    """An open corpus; its arrays are read from disk as they are used."""
+    """An open corpus; its arrays are memory-mapped."""
 
     path: Path
     fps: float
@@ -71,7 +40,7 @@ class Corpus:
     fingerprint: str
     """SHA-256 over the hashes of its arrays: equal data, equal fingerprint."""
     on_demand: bool = False
-    """Whether most training recordings are not stored but generated in training."""
+    """Whether most training recordings are generated during training instead of stored."""
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> "Corpus":
@@ -114,7 +83,7 @@ class Corpus:
         return corpus
 
     def _check(self) -> None:
-        """Shapes and bounds, so that nothing fails later, in the middle of a training."""
+        """Check shapes and bounds, so that nothing fails in the middle of a training."""
         where = self.path / MANIFEST
         if not 0 < self.fps < 10_000:
             raise InputError(f"{where}: is damaged (fps is {self.fps}); prepare the corpus anew.")
@@ -154,7 +123,7 @@ class Corpus:
 
     @cached_property
     def later(self) -> dict[str, Any]:
-        """What is generated in training: see :mod:`a2g_jax.data.on_demand`; nothing for an ordinary corpus."""
+        """Recipes of recordings that are generated in training (:mod:`a2g_jax.data.on_demand`); else empty."""
         return read_json(self.path / PARTS) if self.on_demand else {}
 
     @property
@@ -203,24 +172,28 @@ class Corpus:
 
     @cached_property
     def emotions(self) -> tuple[str, ...]:
-        """Every emotion of the corpus, those to be generated included, in alphabetical order."""
+        """Emotions of the corpus, including recordings to be generated, in alphabetical order."""
         later = self.recipe.get("emotions", ()) if self.on_demand else ()
         return tuple(sorted({*later, *(entry.emotion for entry in self.recordings)}))
 
     @cached_property
     def speakers(self) -> tuple[str, ...]:
-        """Every speaker of the corpus, likewise."""
+        """Speakers of the corpus, likewise."""
         later = self.recipe.get("speakers", ()) if self.on_demand else ()
         return tuple(sorted({*later, *(entry.speaker for entry in self.recordings)}))
 
     @cached_property
     def labels(self) -> Int32[np.ndarray, "N 2"]:
-        """For each row, which of :attr:`emotions` and which of :attr:`speakers` it is of."""
-        return label_rows(self, [(entry.emotion, entry.speaker, entry.frames) for entry in self.recordings])
+        """Indices into :attr:`emotions` and :attr:`speakers` of each row."""
+        return label_rows(
+            self.emotions,
+            self.speakers,
+            [(entry.emotion, entry.speaker, entry.frames) for entry in self.recordings],
+        )
 
     @property
     def parts(self) -> int:
-        """Parts that training takes in turns: the stored recordings, and those that are generated."""
+        """Number of parts that training takes in turns: the stored recordings, and those that are generated."""
         return 1 + len(self.later.get("parts", ()))
 
     @property
@@ -248,10 +221,10 @@ class Corpus:
         """The audio itself, at ``mel.sample_rate``.
 
         Raises:
-            InputError: the corpus does not keep it.
+            InputError: the corpus does not store it.
         """
         if not any(entry.samples for entry in self.recordings):
-            raise InputError(f"{self.path}: keeps no waveforms; prepare it with --waveform.")
+            raise InputError(f"{self.path}: stores no waveforms; prepare it with --waveform.")
         return self._array(WAVEFORM)
 
     def array(self, name: str) -> np.ndarray:
@@ -331,70 +304,5 @@ class Corpus:
         return self.space.motion(np.asarray(self.pose[start:stop]), self.fps, np.asarray(self.root[start:stop]))
 
     def annotations(self, recording: int) -> dict[str, Any]:
-        """Words and whatever else is known about a recording; times in seconds."""
+        """Words and other annotations of a recording; times in seconds."""
         return read_json(self.path / "annotations" / f"{recording:05d}.json")
-
-
-def label_rows(corpus: Corpus, recordings: Sequence[tuple[str, str, int]]) -> Int32[np.ndarray, "N 2"]:
-    """Indices of emotion and speaker for the rows of recordings given as (emotion, speaker, frames)."""
-    each = [(corpus.emotions.index(emotion), corpus.speakers.index(speaker)) for emotion, speaker, _ in recordings]
-    table = np.array(each, np.int32).reshape(-1, 2)
-    return np.repeat(table, [frames for *_, frames in recordings], axis=0)
-
-
-def word_rows(
-    words: Sequence[dict[str, Any]], fps: float, frames: int
-) -> tuple[Int32[np.ndarray, " T"], Bool[np.ndarray, " T"]]:
-    """Ids of the words that are spoken at each frame, and whether a word starts within it.
-
-    Args:
-        words: annotations, each with ``text``, ``start`` and ``end`` in seconds.
-    """
-    spoken = [Word(word["text"], float(word["start"]), float(word["end"])) for word in words]
-    index = words_at_frames(spoken, fps, frames)
-    ids = np.array([*(word_id(word.text) for word in spoken), 0], np.int32)
-    starts = np.zeros(frames, bool)
-    first = np.array([int(word.start * fps) for word in spoken], np.int64)
-    starts[first[(first >= 0) & (first < frames)]] = True
-    return ids[index], starts
-
-
-def skeleton_to_json(skeleton: Skeleton) -> dict[str, Any]:
-    """A skeleton as JSON values."""
-    return {
-        "names": list(skeleton.names),
-        "parents": list(skeleton.parents),
-        "offsets": np.asarray(skeleton.offsets).tolist(),
-        "ends": [[joint, list(offset)] for joint, offset in skeleton.ends],
-    }
-
-
-def skeleton_from_json(value: dict[str, Any]) -> Skeleton:
-    """Inverse of :func:`skeleton_to_json`."""
-    return Skeleton(
-        offsets=np.asarray(value["offsets"], np.float32).reshape(-1, 3),
-        names=tuple(value["names"]),
-        parents=tuple(value["parents"]),
-        ends=tuple((int(joint), (float(x), float(y), float(z))) for joint, (x, y, z) in value.get("ends", [])),
-    )
-
-
-def body_to_json(body: Skeleton | PoseLayout) -> dict[str, Any]:
-    """What the rows of a pose are, as an entry of a manifest."""
-    if isinstance(body, Skeleton):
-        return {"skeleton": skeleton_to_json(body)}
-    return {"layout": asdict(body)}
-
-
-def body_from_json(manifest: dict[str, Any]) -> Skeleton | PoseLayout:
-    """Inverse of :func:`body_to_json`."""
-    if "skeleton" in manifest:
-        return skeleton_from_json(manifest["skeleton"])
-    if "layout" not in manifest:
-        raise KeyError("skeleton")
-    layout = manifest["layout"]
-    return PoseLayout(
-        names=tuple(layout["names"]),
-        bones=tuple((int(start), int(end)) for start, end in layout["bones"]),
-        lengths=tuple(float(length) for length in layout["lengths"]),
-    )

@@ -17,7 +17,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from a2g_jax.data.corpus import ARRAYS, WAVEFORM, Entry, body_from_json, body_to_json
+from a2g_jax.data.body_json import body_from_json, body_to_json
+from a2g_jax.data.corpus_layout import ARRAYS, WAVEFORM, Entry
 from a2g_jax.data.featurise import Prepared, Skipped
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from a2g_jax.data.corpus import PARTS, Corpus, label_rows, word_rows
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import PARTS
+from a2g_jax.data.frame_labels import label_rows, word_rows
 from a2g_jax.data.generated import Role, TalkerOptions, generate_rows
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
@@ -161,7 +163,9 @@ def join_rows(corpus: Corpus, roles: list[Role], arrays: list[dict[str, np.ndarr
     stops = list(accumulate(frames))
     segments = [Segment(n, stop - frames[n], stop) for n, stop in enumerate(stops)]
     labels = label_rows(
-        corpus, [(role["emotion"], role["speaker"], count) for role, count in zip(roles, frames, strict=True)]
+        corpus.emotions,
+        corpus.speakers,
+        [(role["emotion"], role["speaker"], count) for role, count in zip(roles, frames, strict=True)],
     )
     joined = {name: np.concatenate([rows[name] for rows in arrays]) for name in arrays[0]}
     if "waveform" in joined:

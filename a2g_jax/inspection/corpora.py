@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.corpus import Corpus, Entry
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.audio_checks import check_audio

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from a2g_jax.data.corpus import MANIFEST
+from a2g_jax.data.corpus_layout import MANIFEST
 from a2g_jax.errors import InputError
 from a2g_jax.inspection.corpora import inspect_corpus
 from a2g_jax.inspection.files import Inspected, inspect_file, inspect_together

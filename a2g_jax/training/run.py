@@ -12,7 +12,8 @@ from jaxtyping import Array
 
 from a2g_jax import __version__
 from a2g_jax.config import from_json
-from a2g_jax.data.corpus import Corpus, body_from_json, body_to_json
+from a2g_jax.data.body_json import body_from_json, body_to_json
+from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics

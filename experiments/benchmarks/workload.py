@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from a2g_jax.data.corpus import Corpus, Entry
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.data.splits import Segment
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.geometry.pose_space import PoseSpace

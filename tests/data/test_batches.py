@@ -10,7 +10,8 @@ from scipy import stats
 
 from a2g_jax.data.batch import FIELDS, Batch, clip_shape, gather, gather_clips, gather_from_disk
 from a2g_jax.data.batches import BatchMaker, draw_starts, find_crops, tiled_starts
-from a2g_jax.data.corpus import Corpus, Entry
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig

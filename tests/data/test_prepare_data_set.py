@@ -68,7 +68,7 @@ def test_features_of_the_papers(tmp_path, folder, paper):
         np.testing.assert_allclose(kept / 32767.0, audio[: entry.samples], atol=2e-5)
         assert sum(one.samples for one in corpus.recordings) == len(corpus.waveform) == 6 * 48000
     else:
-        with pytest.raises(InputError, match="keeps no waveforms"):
+        with pytest.raises(InputError, match="stores no waveforms"):
             _ = corpus.waveform
 
 

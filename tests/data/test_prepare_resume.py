@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from a2g_jax.data.corpus import ARRAYS, Corpus
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import ARRAYS
 from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
 from a2g_jax.data.featurise import Prepared
 from a2g_jax.data.prepare import prepare_data_set

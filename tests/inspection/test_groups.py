@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
 
-from a2g_jax.data.corpus import MANIFEST
+from a2g_jax.data.corpus_layout import MANIFEST
 from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features

@@ -4,7 +4,8 @@ import os
 from dataclasses import dataclass, replace
 from typing import Any
 
-from a2g_jax.data.corpus import Corpus, Entry
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
