@@ -64,9 +64,11 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     trained = run_training(
         options.model, options.preset, model, training, options.corpus, options.out, options.resume, options.features
     )
-    following = f"a2g generate {options.out} --audio speech.wav --out DIR"
+    # A run folder names its model, and code of other packages is imported only by permission.
+    allowed = f"A2G_MODELS={options.model} " if ":" in options.model else ""
+    following = f"{allowed}a2g generate {options.out} --audio speech.wav --out DIR"
     if not trained.config.space.has_rotations:
-        following = f"a2g evaluate {options.out} --corpus {options.corpus} --out DIR"
+        following = f"{allowed}a2g evaluate {options.out} --corpus {options.corpus} --out DIR"
     if trained.config.build().sample is None:
-        following = f"a2g inspect {options.out}"
+        following = f"{allowed}a2g inspect {options.out}"
     print(f"{options.out}: trained for {trained.steps} steps; next: {following}")

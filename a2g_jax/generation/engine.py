@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.generation.controls import percentiles
 from a2g_jax.models.base import Condition, Latents
-from a2g_jax.models.control_curves import parse_curves, percentiles
+from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 

@@ -73,8 +73,8 @@ def chosen_formats(text: str, known: Sequence[str]) -> tuple[str, ...]:
     formats = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",") if part.strip()))
     unknown = [name for name in formats if name not in known]
     if unknown or not formats:
-        reason = f"no format {unknown[0]!r}" if unknown else "the list is empty"
-        raise InputError(f"--formats: {reason}; the formats are {', '.join(known)}.")
+        reason = f"no format {unknown[0]!r}" if unknown else f"no format in {text!r}"
+        raise InputError(f"{reason}; there are: {', '.join(known)}.")
     return formats
 
 

@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from a2g_jax.errors import InputError
 
 
@@ -121,9 +119,7 @@ def write_json(path: str | os.PathLike[str], value: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # arrays and scalars, without importing NumPy for them
         return value.tolist()
     if isinstance(value, os.PathLike):
         return os.fspath(value)

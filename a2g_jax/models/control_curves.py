@@ -8,9 +8,6 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-from jaxtyping import Float
-
 from a2g_jax.errors import InputError
 
 #: Requested of a control that no line names: the median of the training clips.
@@ -59,13 +56,6 @@ def parse_curves(texts: Sequence[str], names: Sequence[str]) -> tuple[Curve, ...
             raise _refused(text, f"{curve.name} is requested twice; give its changes as 'VALUE@SECOND VALUE@SECOND'")
         curves[curve.name] = curve
     return tuple(curves.get(name, Curve(name, (0.0,), (DEFAULT,))) for name in names)
-
-
-def percentiles(curves: Sequence[Curve], start: int, frames: int, fps: float) -> Float[np.ndarray, "T K"]:
-    """Requested percentiles of the frames from ``start``, which may lie before the first."""
-    seconds = (start + np.arange(frames)) / fps
-    columns = [np.interp(seconds, curve.seconds, curve.percentiles) for curve in curves]
-    return np.stack(columns, axis=-1).astype(np.float32)
 
 
 def _number(text: str, line: str) -> float:

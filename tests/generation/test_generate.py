@@ -105,7 +105,7 @@ def test_skeletons_without_ankles_stand_still():
 def test_formats():
     assert chosen_formats("bvh, HTML", ("bvh", "npz", "html")) == ("bvh", "html")
     for text in ("", "fbx", "bvh;npz"):
-        with pytest.raises(InputError, match="no format|list is empty"):
+        with pytest.raises(InputError, match="no format"):
             chosen_formats(text, ("bvh", "npz", "html"))
 
 

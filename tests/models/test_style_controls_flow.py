@@ -11,11 +11,12 @@ from a2g_jax.cli import main
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.generation.controls import percentiles
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.base import Condition, Data
-from a2g_jax.models.control_curves import parse_curves, percentiles
+from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, requested, scaled
 from a2g_jax.models.stylized_flow.model import build
