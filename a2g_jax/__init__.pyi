@@ -1,0 +1,39 @@
+from a2g_jax.compilations import keep_compilations as keep_compilations
+from a2g_jax.data.corpus import Corpus as Corpus
+from a2g_jax.data.recording import Recording as Recording
+from a2g_jax.errors import InputError as InputError
+from a2g_jax.evaluation.evaluate import evaluate as evaluate
+from a2g_jax.features.mel import log_mel as log_mel
+from a2g_jax.generation.audio2gestures.latent_space import LatentSpace as LatentSpace
+from a2g_jax.generation.export import export as export
+from a2g_jax.generation.generator import Generator as Generator
+from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace
+from a2g_jax.generation.stylized_flow.style import Style as Style
+from a2g_jax.geometry.motion import Motion as Motion
+from a2g_jax.geometry.pose_space import PoseSpace as PoseSpace
+from a2g_jax.geometry.retarget.match import match_rigs as match_rigs
+from a2g_jax.geometry.retarget.rig import find_rig as find_rig
+from a2g_jax.geometry.retarget.transfer import retarget as retarget
+from a2g_jax.geometry.skeleton import Skeleton as Skeleton
+from a2g_jax.inspection.inspect import inspect as inspect
+from a2g_jax.inspection.likelihood import motion_likelihood as motion_likelihood
+from a2g_jax.io.audio import read_audio as read_audio
+from a2g_jax.io.audio import write_audio as write_audio
+from a2g_jax.io.bvh_reader import read_bvh as read_bvh
+from a2g_jax.io.bvh_writer import write_bvh as write_bvh
+from a2g_jax.io.npz import read_motion_npz as read_motion_npz
+from a2g_jax.io.npz import write_motion_npz as write_motion_npz
+from a2g_jax.models.registry import find_model as find_model
+from a2g_jax.talker.recordings import resample_motion as resample_motion
+from a2g_jax.talker.recordings import talk as talk
+from a2g_jax.training.loop import train as train
+from a2g_jax.training.run import Run as Run
+from a2g_jax.training.run import RunConfig as RunConfig
+from a2g_jax.training.run import demo_run as demo_run
+from a2g_jax.training.run import load_run as load_run
+from a2g_jax.training.run import open_run as open_run
+from a2g_jax.viz.player.figure import Figure as Figure
+from a2g_jax.viz.player.page import write_page as write_page
+
+__version__: str
+__all__: list[str]
