@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.pins import Pin
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.metrics.physical import jerk
@@ -34,10 +34,10 @@ def wrist_jerk(places: Float[np.ndarray, "T J 3"], skeleton: Skeleton, fps: floa
 
 
 def _wrists(skeleton: Skeleton) -> list[int]:
-    body = find_body(skeleton)
-    if body is None:
+    joints = find_body_joints(skeleton)
+    if joints is None:
         return list(range(skeleton.joints))
-    return [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
+    return [joints[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
 
 
 def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:

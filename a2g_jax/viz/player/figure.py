@@ -102,7 +102,7 @@ Lane = Track | Bars | Curve | Hands
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """One moving body of the page, with the text under it."""
+    """One motion of the page, with the text under it."""
 
     motion: Motion
     label: str

@@ -84,7 +84,7 @@ def relaxed_hand(size: float, palm_side: float) -> list[tuple[np.ndarray, list[f
     """Fingers of a relaxed hand: points (4, 3) along x thumbward, y to the tips, z; their radii; whether a thumb.
 
     Args:
-        size: 1 for a body of 1.7 m.
+        size: 1 for an adult of 1.7 m.
         palm_side: sign of z on the palm's side.
     """
     fingers = []
