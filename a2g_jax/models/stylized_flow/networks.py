@@ -67,16 +67,16 @@ class State(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The range of each channel in training motion, z-scores; generated poses beyond it are drawn back.
+    """The range of each channel in training motion, z-scores; generated poses beyond it are pulled back.
 
-    Errors of a frame enter the next one, and in minutes they add up in channels that hardly move, as in ankles.
+    Errors of a frame enter the next one, and over minutes they accumulate in channels that hardly move, such as ankles.
     """
 
     low: Float[Array, " C"]
     high: Float[Array, " C"]
 
     def kept(self, x: Float[Array, "B C"]) -> Float[Array, "B C"]:
-        """Poses with what lies beyond the range reduced by a half: a spring, so that nothing stops within a frame."""
+        """Poses with half of the excess over the range removed: a spring, so that no motion stops within a frame."""
         return x - 0.5 * (x - jnp.clip(x, self.low[None], self.high[None]))
 
 
@@ -100,7 +100,7 @@ class FlowNetworks:
         self._fusion = Fusion(config.encoder_channels, config.global_channels)
 
     def init(self, key: Key[Array, ""]) -> Params:
-        """Before the actnorms are fitted to data."""
+        """Initial parameters, before the actnorms are fitted to data."""
         config, keys = self.config, jax.random.split(key, 4)
         params: Params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
         if config.predictor:
