@@ -74,7 +74,7 @@ class Engine:
 
         Args:
             given: conditioning of the whole motion; log-mel features as corpora hold them, not normalised. Fields that
-                the model does not use have to be None, and ``controls`` come from the settings of generation.
+                the model does not use have to be None, and ``controls`` come from the sampling settings.
 
         Raises:
             InputError: a field that the model does not use, or too few seed poses.

@@ -65,16 +65,16 @@ class RunConfig:
     perceptual: Perceptual | None = None
     """The feature network of a perceptual loss."""
     sampling: Any = None
-    """Settings of generation; None for those of the preset."""
+    """Sampling settings; None for those of the preset."""
 
     @property
     def entry(self) -> Entry:
-        """The model's own description."""
+        """The model's registry entry."""
         return find_model(self.model)
 
     @property
     def sampling_settings(self) -> Any:
-        """Settings of generation."""
+        """Sampling settings."""
         return self.entry.sampling_preset(self.preset) if self.sampling is None else self.sampling
 
     @property
@@ -101,10 +101,10 @@ class RunConfig:
         corpus: Corpus,
         perceptual: Perceptual | None = None,
     ) -> "RunConfig":
-        """The run of a model on a corpus.
+        """The description of a run of a model on a corpus.
 
         Raises:
-            InputError: the model does not take such poses.
+            InputError: the model does not take the corpus's kind of poses.
         """
         if poses := find_model(model).poses:
             corpus.require_pose(*poses)
@@ -147,29 +147,29 @@ class RunConfig:
         return model
 
     def with_sampling(self, **changes: Any) -> "RunConfig":
-        """The run with other settings of generation.
+        """The run with other sampling settings.
 
         Raises:
             InputError: a setting that the model does not have, or a value out of range.
         """
-        known = [field.name for field in fields(self.sampling_settings)]
+        names = [field.name for field in fields(self.sampling_settings)]
         for name in changes:
-            if name not in known:
+            if name not in names:
                 raise InputError(
-                    f"{self.model}: has no setting of generation {name!r}; it has: {', '.join(known) or 'none'}."
+                    f"{self.model}: has no sampling setting {name!r}; it has: {', '.join(names) or 'none'}."
                 )
         return replace(self, sampling=replace(self.sampling_settings, **changes))
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A trained model with all that it needs."""
+    """A trained model: description, parameters and latent summary."""
 
     config: RunConfig
     params: Params
     summary: Summary
     steps: int
-    """Training steps behind the weights."""
+    """Training steps of the weights."""
 
 
 def save_run(folder: str | os.PathLike[str], run: Run) -> None:
@@ -251,9 +251,9 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     except InputError:
         raise
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        what = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
+        reason = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
         raise InputError(
-            f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {what}); restore it or train again."
+            f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {reason}); restore it or train again."
         ) from None
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
@@ -264,12 +264,12 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
 
 
 def demo_run() -> Run:
-    """The trained Audio2Gestures that is shipped with the package: ``demo`` on the command line."""
+    """The trained Audio2Gestures shipped with the package: ``demo`` on the command line."""
     return open_run("demo")
 
 
 def demo_flow_run() -> Run:
-    """The trained flow that is shipped with the package: ``demo-flow`` on the command line."""
+    """The trained flow shipped with the package: ``demo-flow`` on the command line."""
     return open_run("demo-flow")
 
 
@@ -289,7 +289,7 @@ def demo_feature_run() -> tuple[Run, str]:
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:
-    """Shapes against the model's own, before anything is computed."""
+    """Compare shapes with the model's own, before anything is computed."""
     import jax
 
     expected = flatten_dict(jax.eval_shape(model.init, jax.random.key(0)), sep="/")

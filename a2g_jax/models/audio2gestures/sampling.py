@@ -1,4 +1,4 @@
-"""Settings of generation with Audio2Gestures; they can change without retraining."""
+"""Sampling settings of Audio2Gestures; they can change without retraining."""
 
 from dataclasses import dataclass, field
 
