@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import jax
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
@@ -50,7 +50,7 @@ def check_poses(folder: str, config: RunConfig, corpus: Corpus) -> None:
         )
 
 
-def features_of(run: Run) -> Callable[[Array], list[Array]]:
+def features_of(run: Run) -> Callable[[Float[Array, "B T R D"]], list[Float[Array, "B T _"]]]:
     """A function of poses (B, T, R, D): features of each block (B, T, width), differentiable, weights constant."""
     params, features = jax.device_put(run.params), run.config.build().features
     assert features is not None

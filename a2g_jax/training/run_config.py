@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
@@ -24,7 +24,7 @@ class Perceptual:
 
     fingerprint: str
     """SHA-256 of its weights."""
-    features: Callable[[Array], list[Array]] | None = None
+    features: Callable[[Float[Array, "B T R D"]], list[Float[Array, "B T _"]]] | None = None
     """Poses (B, T, R, D) to features of each block (B, T, width), differentiable; None in a finished run, since only
     training needs them."""
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Float, Int, Key
+from jaxtyping import Array, Bool, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.models.base import Loss, Model, Params, Stage, Update
@@ -25,7 +25,7 @@ class TrainState(NamedTuple):
     """Steps done, over all stages."""
     key: Key[Array, ""]
     """The run's key; never changes, and is folded with the step."""
-    good: Array
+    good: Bool[Array, ""]
     """Whether every loss and gradient so far was finite."""
 
 

@@ -53,7 +53,9 @@ class Codec:
             params["mapping_net"] = mapping.init(keys[3], code)["params"]
         return params
 
-    def encode_audio(self, params: Params, audio: Float[Array, "B T bands"], dropout_key=None) -> Gaussian:
+    def encode_audio(
+        self, params: Params, audio: Float[Array, "B T bands"], dropout_key: Key[Array, ""] | None = None
+    ) -> Gaussian:
         """The shared code of audio, S_A."""
         code: Gaussian = self._by_clip(
             lambda clips: _apply(self.modules[0], params["audio_encoder"], dropout_key, clips), audio
@@ -61,7 +63,7 @@ class Codec:
         return code
 
     def encode_motion(
-        self, params: Params, pose: Float[Array, "B T R D"], dropout_key=None
+        self, params: Params, pose: Float[Array, "B T R D"], dropout_key: Key[Array, ""] | None = None
     ) -> tuple[Gaussian, Gaussian | None]:
         """The shared and the motion-specific code of motion, S_M and I_M; the latter is None without a split."""
         values = self.data.pose_statistics.normalise(pose) if self.normalises else pose
@@ -76,7 +78,7 @@ class Codec:
         params: Params,
         shared: Float[Array, "B T C"],
         specific: Float[Array, "B T C"] | None,
-        dropout_key=None,
+        dropout_key: Key[Array, ""] | None = None,
     ) -> Float[Array, "B T R D"]:
         """Poses of a full code in time: 6D vectors before Gram-Schmidt, or the values of another kind of pose.
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Key
+from jaxtyping import Array, Bool, Float, Key
 
 from a2g_jax.models.base import Data, Latents, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
@@ -132,7 +132,7 @@ class FlowNetworks:
         params: Params,
         audio: Float[Array, "B T bands"],
         flat: Float[Array, "B T C"],
-        mask: Array | None = None,
+        mask: Bool[Array, "B N history"] | None = None,
         controls: Float[Array, "B T K"] | None = None,
     ) -> Conditioning:
         """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.

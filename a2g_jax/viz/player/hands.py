@@ -80,7 +80,7 @@ def finger_radii(finger: Finger, size: float) -> list[float]:
     return [float(radius) * share for radius in np.interp(stations, range(4), table)]
 
 
-def relaxed_hand(size: float, palm_side: float) -> list[tuple[np.ndarray, list[float], bool]]:
+def relaxed_hand(size: float, palm_side: float) -> list[tuple[Float[np.ndarray, "4 3"], list[float], bool]]:
     """Fingers of a relaxed hand: points (4, 3) along x thumbward, y to the tips, z; their radii; whether a thumb.
 
     Args:

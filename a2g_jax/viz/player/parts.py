@@ -4,9 +4,11 @@ The page has no skeletons: it gets world positions of points and a list of cones
 proportions and the rest pose is decided in :mod:`~a2g_jax.viz.player.shape`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Float
 
 #: A location: a point ``(p,)``, between two points ``(p, q, weight)``, or metres along the axes of a frame
 #: ``(frame, x, y, z)``.
@@ -49,7 +51,7 @@ class Shape:
     wrists: tuple[int, ...] = ()
     """Points whose trails and speeds are drawn."""
 
-    def point(self, joint: int, offset: np.ndarray) -> int:
+    def point(self, joint: int, offset: Float[np.ndarray, " 3"]) -> int:
         """Add a point that is rigid to ``joint``."""
         self.points.append((joint, (float(offset[0]), float(offset[1]), float(offset[2]))))
         return len(self.points) - 1
@@ -64,6 +66,6 @@ class Shape:
         self.cones.append(Cone(start, end, radii[0], radii[1], **more))
 
 
-def short(numbers) -> list:
+def short(numbers: Iterable[float]) -> list:
     """Numbers for compact JSON: whole ones as integers, others with five decimals."""
     return [int(number) if float(number).is_integer() else round(float(number), 5) for number in numbers]
