@@ -86,7 +86,7 @@ class FlowSpace:
     def encode_rows(
         self, rows: Rows, features: LogMel | None = None, before: Earlier | None = None
     ) -> Float[np.ndarray, "T C"]:
-        """:meth:`encode` for poses in the run's pose space, all frames at once.
+        """Latents of poses in the run's pose space: see :meth:`encode`.
 
         Args:
             features: log-mel rows of the frames, not normalised; silence if None.

@@ -47,12 +47,12 @@ class Conditioning(NamedTuple):
 
 
 class AudioContext(NamedTuple):
-    """The share of the conditioning of T frames that depends on no pose, computed before the scan over frames."""
+    """The part of the conditioning of T frames that does not depend on poses, computed before the scan over frames."""
 
     projected: tuple[Array, ...]
-    """For each step of the flow, (T, gates)."""
+    """Projection of the context for each step of the flow, (T, gates)."""
     embedding: Float[Array, "T E"]
-    """Of the audio, for the global encoder; E is 0 without one."""
+    """Embedding of the audio, for the global encoder; E is 0 without one."""
     latents: Latents
     """Mean and scale of the latents: 0 and 1 where they are drawn."""
 
@@ -135,7 +135,7 @@ class FlowNetworks:
         mask: Bool[Array, "B N history"] | None = None,
         controls: Float[Array, "B T K"] | None = None,
     ) -> Conditioning:
-        """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
+        """Conditioning of the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
 
         Args:
             mask: which conditioning poses stay, (B, N, history); None for all.
@@ -203,7 +203,7 @@ class FlowNetworks:
         flat: Float[Array, "B T C"],
         controls: Float[Array, "B T K"] | None = None,
     ) -> Params:
-        """Actnorms and the linear first layer set from a batch; arguments of :meth:`conditioning`."""
+        """Parameters with actnorms and the linear first layer fitted to a batch; arguments of :meth:`conditioning`."""
         x = self.inner(flat)
         if self.config.predictor:
             before = pose_history(flat, self.config.history_frames, self.config.lookahead_frames)
@@ -219,7 +219,7 @@ class FlowNetworks:
         controls: Float[Array, "T K"] | None = None,
         latents: Latents | None = None,
     ) -> AudioContext:
-        """For every frame of an audio; before and after it there are zeros.
+        """The context of every frame of an audio, padded with zeros.
 
         Args:
             controls: style controls, metres and m/s; zeros if None.
@@ -243,7 +243,7 @@ class FlowNetworks:
 
     @staticmethod
     def limits(summary: Summary) -> Limits | None:
-        """Of training motion; None where a run keeps none."""
+        """Limits of training motion; None for a summary without them."""
         if "pose_low" not in summary:
             return None
         return Limits(
@@ -251,7 +251,7 @@ class FlowNetworks:
         )
 
     def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> State:
-        """State before the first frame of so many sequences.
+        """State before the first frame of ``count`` sequences.
 
         Args:
             seed: z-scores of the poses before it; the mean pose if None.

@@ -42,7 +42,7 @@ class Mannequin:
         return path
 
     def torso(self) -> None:
-        """Chest, belly and hips with clothes; shoulders and the muscles from there to the neck."""
+        """Add chest, belly and hips with clothes; shoulders and the muscles from there to the neck."""
         shape, roles, size, rest = self.shape, self.roles, self.size, self.rest
         left, right = roles.arms["left"].top, roles.arms["right"].top
         top = roles.neck if roles.neck is not None else left

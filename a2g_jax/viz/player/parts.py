@@ -34,7 +34,7 @@ class Cone:
     """Whether it casts a soft ambient shadow on the rest of the figure."""
 
     def encoded(self) -> list:
-        """As JSON for the page."""
+        """The cone as JSON for the page."""
         numbers = [self.start_radius, self.end_radius, self.frame, self.axis, self.flat, int(self.shades)]
         return [short(self.start), short(self.end), *short(numbers), self.tint]
 
