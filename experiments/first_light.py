@@ -17,7 +17,7 @@ import numpy as np
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.generator import Generator
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.metrics.rhythm import (
@@ -50,7 +50,7 @@ def multimodality(motions: list[Motion]) -> float:
 
 def jerk(motion: Motion) -> float:
     """90th percentile of the wrists' jerk, m/s^3 (third differences)."""
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     joints = motion.positions() if body is None else motion.positions()[:, [body[20], body[21]]]
     third = np.diff(joints, n=3, axis=0) * motion.fps**3
     return float(np.percentile(np.linalg.norm(third, axis=-1), 90))

@@ -13,7 +13,7 @@ def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
     """Any humanoid BVH, or an NPZ that this package wrote, on a run's skeleton at its frame rate.
 
     Raises:
-        InputError: a file that cannot be read, or a rig that is not understood.
+        InputError: a file that cannot be read, or a rig that is not recognised.
     """
     motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
     return on_skeleton(motion, skeleton, fps, str(path))

@@ -11,8 +11,8 @@ from a2g_jax.training.run import Run
 def corpus_condition(run: Run, corpus: Corpus, start: int, stop: int) -> dict[str, Any]:
     """Fields of :class:`~a2g_jax.models.base.Condition` for rows ``start`` to ``stop`` of one recording.
 
-    Only those that the run's model declares, and that the corpus has: an emotion or speaker that the run was not
-    trained on is left out, and so are seed poses, controls and latents. The audio features are not among them.
+    Only those that the run's model declares and the corpus has: an emotion or speaker that the run was not trained on
+    is left out, and so are the audio features, seed poses, controls and latents.
     """
     fields = run.config.build().condition_fields
     emotions, speakers = (tuple(run.config.corpus.get(name, ())) for name in ("emotions", "speakers"))

@@ -1,7 +1,7 @@
-"""Clips continued from their own first poses, as the flow paper's protocols score them (Sec. 4.1).
+"""Clips continued from their own first poses, as in the flow paper's evaluation protocols (Sec. 4.1).
 
-Of a clip the first poses are given (12 frames on TED, 5 on Trinity), and the following ones up to its lookahead are
-generated. Models without seed poses generate the whole clip, and the frames at the same place are taken.
+The first poses of a clip are given (12 frames on TED, 5 on Trinity), and the following ones up to its lookahead are
+generated. Models without seed poses generate the whole clip, from which the same frames are taken.
 """
 
 from typing import Any
@@ -28,18 +28,18 @@ def continue_clips(
     samples: int,
     seed: int = 0,
 ) -> Float[np.ndarray, "N samples frames R D"]:
-    """Frames ``first`` to ``last`` of clips, so many times each.
+    """Frames ``first`` to ``last - 1`` of clips, ``samples`` times each.
 
     Sample k of clip n depends on the clip, the run, the seed, n and k alone.
 
     Args:
-        audio: features as a corpus holds them, not normalised.
-        pose: seed poses are the last ones before ``first``, for models that take any.
+        audio: features as in a corpus, not normalised.
+        pose: seed poses are the last ones before ``first``, for models that take seed poses.
         first: number of the first frame that is generated; at least the model's number of seed poses.
-        last: one behind the last; for autoregressive models, at most T less their lookahead.
+        last: number of the frame after the last one; for autoregressive models, at most T less their lookahead.
 
     Raises:
-        ValueError: seed poses or lookahead that leave the clip.
+        ValueError: seed poses or lookahead outside of the clip.
     """
     config, model = run.config, run.config.build()
     normalised = np.asarray(config.statistics["audio"].normalise(audio), np.float32)
@@ -58,7 +58,7 @@ def continue_clips(
 
 
 def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
-    """The frames one after another, all clips and samples side by side."""
+    """A function that draws the frames one after another, all clips and samples in parallel."""
     history, lookahead = model.seed_frames, model.lookahead
     if first < history or last > frames - lookahead:
         raise ValueError(
@@ -70,7 +70,7 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
     assert proceed is not None
 
     def draw(params, summary, keys, audio, pose):
-        del summary  # of its range of poses, to which generation of minutes keeps
+        del summary  # its limits of poses are for generation of minutes
 
         def one_clip(keys, audio, pose):
             given = jax.tree.map(lambda array: array[first:last], condition(params, {}, Condition(audio)))
@@ -88,7 +88,7 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
 
 
 def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
-    """The frames of a motion for the whole clip."""
+    """A function that draws motions of whole clips and takes the frames from them."""
     del frames
     condition, sample, space = model.condition, model.sample, run.config.space
     assert condition is not None

@@ -18,7 +18,7 @@ from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
 
-#: Frames that one call of a compiled function gives. One size for every audio: nothing compiles anew for a new length.
+#: Frames that one call of a compiled function gives. One size for every audio: a new length does not compile again.
 WINDOW = 1024
 #: Samples that an autoregressive model generates side by side: one reading of its weights serves all of them. Always as
 #: many, also for a single one, so that a sample does not depend on how many are requested.
@@ -75,7 +75,7 @@ class Engine:
 
         Args:
             given: conditioning of the whole motion; log-mel features as corpora hold them, not normalised. Fields that
-                the model does not use have to be None, and ``controls`` come from the settings of generation.
+                the model does not use have to be None, and ``controls`` come from the sampling settings.
 
         Raises:
             InputError: a field that the model does not use, or too few seed poses.

@@ -1,4 +1,4 @@
-"""Generated motions as files, and a page to watch them on."""
+"""Generated motions as files, and a page that plays them."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -32,11 +32,11 @@ def export(
     """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``.
 
     Args:
-        run: what the sampler generates with.
+        run: the sampler's.
         audio: mono, at the run's sample rate.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
-        label: further words on the sampler, for the page's subtitle.
+        label: description of the sampler, for the page's subtitle.
         lanes: further tracks of the page's timeline.
         others: a regular expression for further files of the folder that are replaced.
         report: called with the number of samples done.

@@ -21,15 +21,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MotionFormat:
-    """A format with a file for each motion."""
+    """An output format with one file for each motion."""
 
     suffix: str
-    """Of its files, such as ``.bvh``."""
+    """Suffix of its files, such as ``.bvh``."""
     writer: str
     """``module:function`` of ``write(path, motion)``, which writes a whole file or none."""
 
     def write(self, path: Path, motion: "Motion") -> None:
-        """Write a motion."""
+        """Write a motion to a file."""
         load_object(self.writer, "writer")(path, motion)
 
 
@@ -48,7 +48,7 @@ def motion_formats() -> dict[str, MotionFormat]:
     """The formats of this package, and those that other packages add in the entry-point group ``a2g_jax.formats``.
 
     Raises:
-        InputError: another package's cannot be loaded.
+        InputError: a format of another package cannot be loaded.
     """
     found = dict(MOTION_FORMATS)
     for name, point in entry_points_of(GROUP).items():
@@ -64,22 +64,22 @@ def talk_formats() -> tuple[str, ...]:
     return ("wav", "textgrid", "json", *motion_formats(), PAGE)
 
 
-def chosen_formats(text: str, known: Sequence[str]) -> tuple[str, ...]:
+def chosen_formats(text: str, available: Sequence[str]) -> tuple[str, ...]:
     """The formats in a comma-separated list.
 
     Raises:
         InputError: an empty list, or an unknown format.
     """
     formats = tuple(dict.fromkeys(part.strip().lower() for part in text.split(",") if part.strip()))
-    unknown = [name for name in formats if name not in known]
+    unknown = [name for name in formats if name not in available]
     if unknown or not formats:
         reason = f"no format {unknown[0]!r}" if unknown else f"no format in {text!r}"
-        raise InputError(f"{reason}; there are: {', '.join(known)}.")
+        raise InputError(f"{reason}; there are: {', '.join(available)}.")
     return formats
 
 
 def check_page_size(motions: int, frames: int, joints: int) -> None:
-    """Refuse a page that no browser would open.
+    """Refuse a page that is too large for a browser.
 
     Raises:
         InputError: too many joint positions.
@@ -103,29 +103,29 @@ class MotionFiles:
         stem: str,
         formats: Sequence[str],
         others: str = "",
-        known: Mapping[str, MotionFormat] | None = None,
+        available: Mapping[str, MotionFormat] | None = None,
     ) -> None:
         """
         Args:
-            stem: of the files' names.
+            stem: beginning of the files' names.
             formats: names of formats; those without a file for each motion are ignored.
             others: a regular expression for further files that are replaced.
-            known: the formats; those of :func:`motion_formats` if None.
+            available: formats by name; those of :func:`motion_formats` if None.
 
         Raises:
             InputError: a folder that cannot be used.
         """
-        known = motion_formats() if known is None else known
+        available = motion_formats() if available is None else available
         self.folder = make_folder(out)
         self._stem = stem
-        self._formats = {name: known[name] for name in formats if name in known}
-        suffixes = "|".join(re.escape(each.suffix) for each in known.values())
+        self._formats = {name: available[name] for name in formats if name in available}
+        suffixes = "|".join(re.escape(each.suffix) for each in available.values())
         own = re.compile(rf"{stem}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
         for old in self.folder.iterdir():
             if own.fullmatch(old.name) and not old.is_dir():
                 old.unlink()
 
     def write(self, number: int, motion: "Motion") -> None:
-        """The files of a motion."""
+        """Write the files of a motion."""
         for each in self._formats.values():
             each.write(self.folder / f"{self._stem}_{number:02d}{each.suffix}", motion)

@@ -20,15 +20,15 @@ Audio = Float[np.ndarray, " N"]
 
 @runtime_checkable
 class Sampler(Protocol):
-    """Plain, edited, pinned and styled generation: different motions for one speech, one after another."""
+    """The interface of plain, pinned and styled generation: different motions for one speech."""
 
     def stream(self, audio: Audio, samples: int, seed: int = 0) -> Iterator[Motion]:
-        """Sample k depends on the audio, the run, the seed and k alone."""
+        """Yield motions; sample k depends on the audio, the run, the seed and k alone."""
         ...
 
 
 class Generator:
-    """A run ready to generate for any audio; settings of generation are those of ``run.config``."""
+    """Generates motion for any audio with a run; sampling settings are those of ``run.config``."""
 
     def __init__(self, run: Run, window: int = WINDOW) -> None:
         """
@@ -74,7 +74,7 @@ class Generator:
         return motions
 
     def stream(self, audio: Audio, samples: int, seed: int = 0, **given: Any) -> Iterator[Motion]:
-        """:meth:`generate`, one motion at a time."""
+        """Yield the motions of :meth:`generate` one at a time."""
         features = speech_features(self.run, audio)
         if "waveform" in self.engine.model.condition_fields:
             given.setdefault("waveform", np.asarray(audio, np.float32))
@@ -83,17 +83,17 @@ class Generator:
     def stream_features(
         self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0, **given: Any
     ) -> Iterator[Motion]:
-        """:meth:`stream` for log-mel features, one row a frame, not normalised.
+        """Yield the motions of :meth:`stream` for log-mel features, one row a frame, not normalised.
 
         Raises:
-            InputError: the run generates keypoints or directions, which are no motion of a skeleton; see :meth:`rows`.
+            InputError: the run generates keypoints or directions, which do not move a skeleton; see :meth:`rows`.
         """
         _ = self.run.config.skeleton
         for rows in self.rows(features, samples, seed, **given):
-            yield stand(self.run, rows)
+            yield plant_rows(self.run, rows)
 
     def rows(self, features: Float[np.ndarray, "T bands"], samples: int, seed: int = 0, **given: Any) -> Iterator[Rows]:
-        """Different motions in the run's pose space, for log-mel features, not normalised."""
+        """Yield different motions in the run's pose space, for log-mel features, not normalised."""
         audio: Any = features
         yield from self.engine.rows(Condition(audio, **given), samples, seed)
 
@@ -115,17 +115,17 @@ def speech_features(run: Run, audio: Audio) -> Float[np.ndarray, "T bands"]:
     return log_mel(audio, run.config.mel, run.config.fps, frames)
 
 
-def stand(run: Run, rows: Rows) -> Motion:
+def plant_rows(run: Run, rows: Rows) -> Motion:
     """The motion of poses of a run, with a root that plants the feet.
 
     Raises:
         InputError: the run generates keypoints or directions.
     """
     _ = run.config.skeleton
-    return stand_rotations(run, rotations_from_rows(rows, run.config.space.kind))
+    return plant_rotations(run, rotations_from_rows(rows, run.config.space.kind))
 
 
-def stand_rotations(run: Run, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
+def plant_rotations(run: Run, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
     """The motion of local rotations, with a root that plants the feet as in the run's mean pose."""
     config = run.config
     still = Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps)

@@ -4,7 +4,7 @@ from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 
 
-def find_body(skeleton: Skeleton) -> tuple[int, ...] | None:
+def find_body_joints(skeleton: Skeleton) -> tuple[int, ...] | None:
     """Index of each of the 22 body joints (:data:`~a2g_jax.geometry.skeleton.BODY_JOINTS`, in their order).
 
     Recognises the names listed in :mod:`~a2g_jax.geometry.joint_names`, with any prefix (``mixamorig:``), case or

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
@@ -26,7 +26,7 @@ def plant_feet(motion: Motion, mean_root: Float[np.ndarray, " 3"], mean_pose: Fl
         mean_pose: mean local rotations over the training data.
     """
     start = np.array([0.0, mean_root[1], 0.0], np.float32)
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     if body is None:
         return replace(motion, root=np.tile(start, (motion.frames, 1)))
     ankles = [body[joint] for joint in _ANKLES]

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
@@ -165,7 +165,7 @@ class PoseSpace:
 
     def wrist_rows(self) -> tuple[int, ...] | None:
         """Joints of the left and right wrist; None where they are not found."""
-        body = find_body(self.body) if isinstance(self.body, Skeleton) else None
+        body = find_body_joints(self.body) if isinstance(self.body, Skeleton) else None
         return None if body is None else tuple(body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR")
 
     def wrists(self, positions: Float[np.ndarray, "T P _"]) -> Float[np.ndarray, "T w _"]:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.rotation import geodesic_distance
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 
@@ -38,7 +38,7 @@ def position_l1_star(
 
 def wrist_to_wrist(skeleton: Skeleton) -> float | None:
     """Length of the bones from wrist to wrist in a T-pose, metres; None where wrists are not found."""
-    body = find_body(skeleton)
+    body = find_body_joints(skeleton)
     if body is None:
         return None
     lengths, chains = np.linalg.norm(np.asarray(skeleton.offsets), axis=-1), []

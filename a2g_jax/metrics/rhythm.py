@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage, signal
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
@@ -37,7 +37,7 @@ def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: floa
 
 def wrist_speed(motion: Motion, smoothing: float = 0.05) -> Float[np.ndarray, " T"]:
     """Speed of the faster wrist, or of the fastest joint, in m/s, smoothed by a Gaussian of that width in seconds."""
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     positions = motion.positions()
     if body is not None:
         positions = positions[:, [body[joint] for joint in _WRISTS]]

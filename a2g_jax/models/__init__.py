@@ -1,4 +1,4 @@
-"""Generative models and networks that measure: a folder each, and one line in the registry."""
+"""Generative models, and networks for metrics: a folder each, and one line in the registry."""
 
 from a2g_jax.models.registry import MODELS as MODELS
 from a2g_jax.models.registry import find_model as find_model

@@ -106,7 +106,7 @@ class Density(NamedTuple):
     Nats of each of the N frames that have the whole conditioning around them, given the poses before it and the audio,
     as a density of z-scores; with the treatment of noise that the model documents. The first of these frames is number
     ``history``, and ``lookahead`` frames follow the last. ``clean`` is the poses before noise was added to them, if it
-    was: what is measured on poses is measured on those.
+    was: properties of poses are measured on those.
     """
     conditioning: Callable[..., tuple[Array, Array]]
     """``conditioning(audio, pose, clean) -> ((B, N, D), (B, N, C))``: everything that these frames are conditioned on,
@@ -155,7 +155,7 @@ class Model(NamedTuple):
     """Whether a loss needs :attr:`Data.perceptual`."""
 
     condition: Callable[..., Any] | None = None
-    """``condition(params, summary, Condition of a window) -> pytree``: what all samples for one audio share."""
+    """``condition(params, summary, Condition of a window) -> pytree``: shared by all samples for one audio."""
     condition_fields: tuple[str, ...] = ("audio",)
     """Fields of :class:`Condition` that ``condition`` and ``begin`` can use."""
     sample: Callable[..., Array] | None = None

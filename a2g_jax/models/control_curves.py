@@ -1,7 +1,7 @@
 """Curves of named controls over a speech, as an animator writes them; importable without JAX.
 
 ``height=90`` is 90 throughout; ``speed=20@0 80@10`` is 20 at the start and 80 from second 10 on, linearly in between.
-Values are percentiles of the training clips, which every corpus and rig has.
+Values are percentiles of the training clips, so that they apply to any corpus and rig.
 """
 
 import math
@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 from a2g_jax.errors import InputError
 
-#: Requested of a control that no line names: the median of the training clips.
+#: Percentile of a control that is not requested: the median of the training clips.
 DEFAULT = 50.0
 
 
 class Curve(NamedTuple):
-    """Requested percentiles of one control at seconds, linear between them and held beyond."""
+    """Requested percentiles of one control at given seconds, linear between them and constant beyond."""
 
     name: str
     seconds: tuple[float, ...]
@@ -23,10 +23,10 @@ class Curve(NamedTuple):
 
 
 def parse_curve(text: str) -> Curve:
-    """A curve from its line: ``NAME=PERCENTILE``, or ``NAME=PERCENTILE@SECOND PERCENTILE@SECOND ...``.
+    """Parse the line of a curve: ``NAME=PERCENTILE``, or ``NAME=PERCENTILE@SECOND PERCENTILE@SECOND ...``.
 
     Raises:
-        InputError: anything else, percentiles outside of 0 to 100, or seconds that do not rise.
+        InputError: another form, percentiles outside of 0 to 100, or seconds not in ascending order.
     """
     name, equals, points = text.partition("=")
     parts = [part.partition("@") for part in points.split()]
@@ -37,7 +37,7 @@ def parse_curve(text: str) -> Curve:
     if not all(0 <= percentile <= 100 for percentile in percentiles):
         raise _refused(text, "expected percentiles of the training clips, from 0 to 100")
     if any(after <= before for before, after in zip(seconds, seconds[1:], strict=False)):
-        raise _refused(text, "expected seconds that rise")
+        raise _refused(text, "expected seconds in ascending order")
     return Curve(name.strip(), seconds, percentiles)
 
 
@@ -45,7 +45,7 @@ def parse_curves(texts: Sequence[str], names: Sequence[str]) -> tuple[Curve, ...
     """One curve for each of ``names``, in their order.
 
     Raises:
-        InputError: a line that is no curve, of a control that the model does not have, or of one twice.
+        InputError: an invalid line, an unknown control, or a control requested twice.
     """
     curves: dict[str, Curve] = {}
     for text in texts:
@@ -64,7 +64,7 @@ def _number(text: str, line: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _refused(line, f"{text!r} is no number")
+        raise _refused(line, f"{text!r} is not a number")
     return value
 
 

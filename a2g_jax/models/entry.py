@@ -1,4 +1,4 @@
-"""How a model introduces itself; importable without JAX."""
+"""The registry entry of a model; importable without JAX."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from a2g_jax.models.train_config import TRAIN_PRESETS, TrainConfig
 
 @dataclass(frozen=True)
 class NoSampling:
-    """Settings of generation of a model that has none."""
+    """Sampling settings of a model without any."""
 
 
 NO_SAMPLING = NoSampling()
@@ -18,22 +18,22 @@ NO_SAMPLING = NoSampling()
 
 @dataclass(frozen=True)
 class Entry:
-    """The settings of a model with their presets, and the function that builds it."""
+    """The settings of a model with their presets, and the function that builds the model."""
 
     config: type
     """Frozen dataclass of the settings of networks and losses; it has ``clip_frames``."""
     presets: Mapping[str, Any]
-    """Instances of ``config`` by name: ``tiny`` trains in minutes on 2 cores, ``paper`` is the paper's."""
+    """Instances of ``config`` by name: ``tiny`` trains in minutes on 2 cores, ``paper`` has the paper's settings."""
     build: str
     """``module:function`` of ``build(config, data, sampling) -> Model``; imported when it is needed, with JAX."""
     sampling: type = NoSampling
-    """Frozen dataclass of the settings of generation; the flags of ``a2g generate`` are made from it."""
+    """Frozen dataclass of the sampling settings; the flags of ``a2g generate`` are made from it."""
     sampling_presets: Mapping[str, Any] = field(default_factory=dict)
     """Instances of ``sampling`` by preset; the defaults of ``sampling`` where a preset is missing."""
     training: Mapping[str, TrainConfig] = field(default_factory=lambda: TRAIN_PRESETS)
-    """Settings of training by preset."""
+    """Training settings by preset."""
     poses: tuple[str, ...] = ()
-    """Kinds of poses that it takes (:data:`a2g_jax.geometry.pose_space.WIDTHS`); all if empty."""
+    """Kinds of poses that the model takes (:data:`a2g_jax.geometry.pose_space.WIDTHS`); all if empty."""
 
     def builder(self) -> Callable[..., Any]:
         """The function that ``build`` names."""
@@ -42,9 +42,9 @@ class Entry:
         return function
 
     def sampling_preset(self, preset: str) -> Any:
-        """Settings of generation of a preset."""
+        """Sampling settings of a preset."""
         return self.sampling_presets.get(preset, self.sampling())
 
     def training_preset(self, preset: str) -> TrainConfig:
-        """Settings of training of a preset; those of the common preset of that name where the model has no own."""
+        """Training settings of a preset; the common ones of that name if the model has none of its own."""
         return self.training.get(preset, TRAIN_PRESETS.get(preset, TRAIN_PRESETS["tiny"]))

@@ -1,4 +1,4 @@
-"""The optimiser of a training's settings: Adam with a schedule and clipping."""
+"""The common optimiser of training: Adam with a schedule and clipping."""
 
 import jax.numpy as jnp
 import optax
@@ -25,7 +25,7 @@ def learning_rate(config: TrainConfig) -> optax.Schedule:
 
 
 def _noam(config: TrainConfig) -> optax.Schedule:
-    """Linearly up to the learning rate over the warm-up, then down with the root of the step, to a tenth of it."""
+    """Linear warm-up to the learning rate, then decay with the inverse root of the step, to a tenth of the rate."""
     warmup = max(1, config.warmup_steps)
 
     def schedule(count):

@@ -29,13 +29,13 @@ def model_names() -> tuple[str, ...]:
 
 
 def find_model(name: str) -> Entry:
-    """The model of that name, as a person gives it: see :func:`find_trained_model` for names in files.
+    """The entry of a model that the user names; see :func:`find_trained_model` for names in files.
 
     Args:
         name: of this package's models, of an entry point, or ``package.module:ENTRY``, which is imported.
 
     Raises:
-        InputError: there is none, or another package's cannot be imported.
+        InputError: no model of that name, or another package's that cannot be imported.
     """
     if name in MODELS:
         entry: Entry = import_module(MODELS[name]).ENTRY
@@ -57,13 +57,13 @@ _allowed: set[str] = set()
 
 
 def find_trained_model(name: str, where: str) -> Entry:
-    """The model that a file names.
+    """The entry of a model that a file names.
 
     Args:
         where: the file, for the error.
 
     Raises:
-        InputError: there is none, or the name is a reference that nobody has allowed.
+        InputError: no model of that name, or a reference to another package that is not allowed.
     """
     allowed = {*_allowed, *(part.strip() for part in os.environ.get("A2G_MODELS", "").split(","))}
     if ":" in name and name not in allowed:

@@ -14,20 +14,20 @@ class TrainConfig:
     batch_size: int = 32
     """Clips in a batch."""
     learning_rate: float = 1e-4
-    """Of Adam; the peak, if a schedule moves it."""
+    """Learning rate of Adam; its peak if a schedule changes it."""
     schedule: str = "constant"
-    """'constant'; 'cosine': half a cosine down to a hundredth of the peak at the last step; or 'noam': down with the
-    root of the step to a tenth of the peak."""
+    """'constant'; 'cosine': half a cosine down to a hundredth of the peak at the last step; or 'noam': decay with
+    the inverse root of the step, to a tenth of the peak."""
     warmup_steps: int = 0
     """Steps over which the learning rate rises linearly from zero."""
     clip_norm: float = 0.0
-    """Gradients longer than this are scaled down to it; 0 for never."""
+    """Gradients longer than this are scaled down to it; 0 for no clipping."""
     clip_value: float = 0.0
-    """Entries of gradients beyond this are cut off at it, before ``clip_norm``; 0 for never."""
+    """Entries of gradients beyond this are cut to it, before ``clip_norm``; 0 for no clipping."""
     augmentation: float = 0.0
-    """Strength of the random gain, equaliser and noise on audio features; 0 for none, 1 for a lot."""
+    """Strength of the random gain, equaliser and noise on audio features; 0 for none, 1 for strong."""
     seed: int = 0
-    """Of initial weights, batches and everything drawn in training."""
+    """Seed of initial weights, batches and all random draws of training."""
     checkpoint_every: int = 1_000
     """Steps between checkpoints."""
     validate_every: int = 1_000
@@ -35,11 +35,11 @@ class TrainConfig:
     log_every: int = 20
     """Steps between lines of metrics.jsonl and checks for NaN."""
     keep_checkpoints: int = 2
-    """Latest checkpoints that are kept."""
+    """Number of latest checkpoints that are kept."""
     device_megabytes: float = 2_000.0
-    """Corpora up to this size are held on the device; larger ones are read from disk batch by batch."""
+    """Corpora up to this size are kept on the device; larger ones are read from disk batch by batch."""
     part_steps: int = 500
-    """Steps on one part of a corpus prepared with --on-demand before the next one's turn; others are one part."""
+    """Steps on one part of a corpus prepared with --on-demand before the next part; other corpora are one part."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
 

@@ -1,4 +1,4 @@
-"""Checkpoints of a training run: Orbax, atomic, the latest few."""
+"""Checkpoints of a training run, with Orbax: atomic, the latest few."""
 
 import os
 import shutil
@@ -39,7 +39,7 @@ class Checkpoints:
         """The latest state, or None if there is none.
 
         Args:
-            like: a state with the run's shapes, such as that of step 0.
+            like: a state of the run's shapes, such as that of step 0.
 
         Raises:
             InputError: the checkpoint is damaged or of another model.
@@ -54,7 +54,7 @@ class Checkpoints:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
                 f"{path}: cannot be resumed from ({first[:200]}); remove this folder to resume from the one before it,"
-                " or start anew without --resume."
+                " or start again without --resume."
             ) from error
         return TrainState(**tree)
 

@@ -33,7 +33,7 @@ class MetricsLog:
             self.tensorboard = SummaryWriter(str(folder / "tensorboard"), purge_step=done + 1)
         from tqdm import tqdm
 
-        # A terminal gets a moving bar; a log file gets a line now and then.
+        # A terminal gets a moving bar, a log file an occasional line.
         every = 0.5 if sys.stderr.isatty() else 30.0
         self.bar = tqdm(
             total=total,
@@ -57,23 +57,23 @@ class MetricsLog:
             self.tensorboard.close()
 
     def tick(self, step: int) -> None:
-        """A step was done."""
+        """Advance the progress bar to a step."""
         self.bar.update(step - self.bar.n)
 
     def write(self, step: int, values: dict[str, float]) -> None:
-        """The terms of a training step."""
+        """Write the terms of a training step."""
         names = [name for name in ("loss", "position", "relaxed", "gradient_norm") if name in values]
         self.bar.set_postfix({name: f"{values[name]:.4g}" for name in names}, refresh=False)
         self.tick(step)
         self._line(step, "train", values)
 
     def write_validation(self, step: int, values: dict[str, float]) -> None:
-        """The mean terms over the validation split; nothing is written when there are none."""
+        """Write the mean terms over the validation split, unless there are none."""
         if values:
             self._line(step, "validation", values)
 
     def _line(self, step: int, split: str, values: dict[str, float]) -> None:
-        # JSON knows no NaN.
+        # JSON has no NaN.
         plain = {name: value if math.isfinite(value) else None for name, value in values.items()}
         self.file.write(json.dumps({"step": step, "split": split, **plain}) + "\n")
         self.file.flush()
@@ -82,7 +82,7 @@ class MetricsLog:
                 self.tensorboard.add_scalar(f"{split}/{name}", value, step)
 
     def _drop_after(self, done: int) -> None:
-        """Remove lines of steps that will be repeated, and a line that a kill cut short."""
+        """Remove lines of steps that will be repeated, and a line truncated by a kill."""
         if not self.path.exists():
             return
         kept = []

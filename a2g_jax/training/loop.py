@@ -28,12 +28,12 @@ from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 from a2g_jax.training.validation import collect_summary, validate
 
-#: Settings that may change between parts of a run, because they do not touch what is computed in a step.
+#: Settings that may change on resuming, because the computation of a step does not depend on them.
 _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
 
 
 class TrainingError(A2GError):
-    """Training cannot continue: the message says at which step, why, and what to try."""
+    """Training cannot continue: the message has the step, the reason and a remedy."""
 
 
 def train(
@@ -45,7 +45,7 @@ def train(
 
     Args:
         out: the run folder. It must not hold a run, unless resuming.
-        resume: continue from the latest checkpoint; starts anew where there is none.
+        resume: continue from the latest checkpoint; starts again if there is none.
         progress: show a progress bar on standard error.
 
     Raises:
@@ -55,7 +55,7 @@ def train(
     """
     out = Path(out)
     settings = config.train_config
-    # Whatever can be wrong is found before anything is written.
+    # Errors are found before anything is written.
     model = config.build()
     find_crops(corpus, "train", model.clip_frames)
     if model.needs_perceptual and config.data().perceptual is None:
@@ -109,7 +109,7 @@ def train(
                 run = export(state)
             if stop.is_set():
                 raise _interrupted(out, done, total)
-    # A run that was finished before has nothing to do but may lack its weights, if it was killed while writing them.
+    # A finished run may lack its weights, if it was killed while writing them.
     return run if run is not None else export(state)
 
 
@@ -125,7 +125,7 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
             raise InputError(f"{out}: is not empty and holds no run; choose another folder.")
         return
     if not checkpoints.steps() and not (out / WEIGHTS_FILE).exists():
-        return  # stopped before its first checkpoint: nothing is lost by starting anew
+        return  # stopped before its first checkpoint: nothing is lost by starting again
     if not resume:
         raise InputError(f"{out}: holds a run already; continue it with --resume, or choose another folder.")
     values = read_json(out / RUN_FILE)
@@ -156,7 +156,7 @@ _Step = Callable[[TrainState], tuple[TrainState, Metrics]]
 
 
 class _Steps:
-    """Steps on the parts of a corpus; parts alike in the lengths of their recordings share their compiled programs."""
+    """Steps on the parts of a corpus; parts with recordings of the same lengths share compiled programs."""
 
     def __init__(self, config: RunConfig, shape: ClipShape) -> None:
         self._config, self._shape = config, shape
@@ -176,7 +176,7 @@ class _Steps:
 
 
 def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunConfig) -> Callable[[Part], _Step]:
-    """One whole step: choose clips, augment, compute, update. The same clips wherever the data lies."""
+    """A function from parts to whole steps: choose clips, augment, compute, update; the same for data on disk."""
     settings = config.train_config
     make_batch = BatchMaker(config.statistics["audio"], settings.augmentation)
 
@@ -196,8 +196,8 @@ def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunCo
 
     def on(part: Part) -> _Step:
         if sum(array.nbytes for array in part.arrays.values()) / 1e6 <= settings.device_megabytes:
-            held = {name: jax.device_put(np.asarray(array)) for name, array in part.arrays.items()}
-            return lambda state: on_device(state, held)
+            arrays = {name: jax.device_put(np.asarray(array)) for name, array in part.arrays.items()}
+            return lambda state: on_device(state, arrays)
 
         def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
             clips = gather_clips(part.arrays, shape, np.asarray(choose(state)), gather_from_disk)
@@ -213,15 +213,15 @@ def _check_finite(state: TrainState, step: int, values: dict[str, float], checkp
         return
     broken = ", ".join(name for name, value in values.items() if not np.isfinite(value))
     last = max(checkpoints.steps(), default=None)
-    kept = "there is no checkpoint yet" if last is None else f"the checkpoint of step {last} is good"
+    hint = "there is no checkpoint yet" if last is None else f"the checkpoint of step {last} is good"
     raise TrainingError(
-        f"training went wrong at or shortly before step {step}: {broken or 'loss or gradient'} not finite; {kept};"
+        f"training failed at or shortly before step {step}: {broken or 'loss or gradient'} not finite; {hint};"
         " try a lower --learning-rate or a --clip-norm."
     )
 
 
 def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, state: TrainState) -> Run:
-    """Weights and latent statistics where generation finds them."""
+    """Write weights and the latent summary to the run folder, for generation."""
     params = jax.device_get(state.params)
     summary = collect_summary(model, state.params, corpus, config)
     run = Run(config, params, summary, int(state.step))
@@ -231,7 +231,7 @@ def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, state: T
 
 @contextmanager
 def _stop_requested() -> Iterator[threading.Event]:
-    """An event that SIGINT and SIGTERM set, so that a step is never cut in half; a second signal ends at once."""
+    """An event that SIGINT and SIGTERM set, so that a step is never interrupted; a second signal ends at once."""
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield event

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import jax
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
@@ -19,7 +19,7 @@ def load_feature_run(folder: str | os.PathLike[str], corpus: Corpus) -> tuple[Ru
 
     Args:
         folder: of the run, or "demo" for the one that is shipped with the package.
-        corpus: whose poses it has to take.
+        corpus: its poses must fit the network.
 
     Raises:
         InputError: not a run, one of a model without features, or one for other joints, poses or frame rate.
@@ -40,17 +40,18 @@ def check_poses(folder: str, config: RunConfig, corpus: Corpus) -> None:
     Raises:
         InputError: other joints, poses or frame rate.
     """
-    there = (config.space.kind, config.space.shape, config.fps)
-    here = (corpus.space.kind, corpus.space.shape, corpus.fps)
-    if there != here:
+    theirs = (config.space.kind, config.space.shape, config.fps)
+    ours = (corpus.space.kind, corpus.space.shape, corpus.fps)
+    if theirs != ours:
         raise InputError(
-            f"{folder}: takes {there[0]} {there[1]} at {there[2]:g} fps, but {corpus.path} holds {here[0]} {here[1]}"
-            f" at {here[2]:g} fps; train one on such a corpus, or prepare the corpus so (--fps, --pose, --joints)."
+            f"{folder}: takes {theirs[0]} {theirs[1]} at {theirs[2]:g} fps, but {corpus.path} holds {ours[0]}"
+            f" {ours[1]} at {ours[2]:g} fps; train one on such a corpus, or prepare the corpus to match"
+            " (--fps, --pose, --joints)."
         )
 
 
-def features_of(run: Run) -> Callable[[Array], list[Array]]:
-    """Poses (B, T, R, D) to the features of each block (B, T, width), differentiable, the weights constant."""
+def features_of(run: Run) -> Callable[[Float[Array, "B T R D"]], list[Float[Array, "B T _"]]]:
+    """A function of poses (B, T, R, D): features of each block (B, T, width), differentiable, weights constant."""
     params, features = jax.device_put(run.params), run.config.build().features
     assert features is not None
     return lambda pose: features(params, pose)

@@ -1,29 +1,27 @@
 """A run folder: everything that generation needs, in JSON and safetensors."""
 
 import os
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from flax.traverse_util import flatten_dict, unflatten_dict
-from jaxtyping import Array
 
 from a2g_jax import __version__
 from a2g_jax.config import from_json
 from a2g_jax.data.body_json import body_from_json, body_to_json
-from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
-from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import atomic_path, sha256_file, write_json
-from a2g_jax.models.base import Data, Model, Params, Summary
-from a2g_jax.models.entry import Entry
-from a2g_jax.models.registry import find_model, find_trained_model
+from a2g_jax.models.base import Model, Params
+from a2g_jax.models.registry import find_trained_model
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.run_config import Perceptual as Perceptual
+from a2g_jax.training.run_config import Run as Run
+from a2g_jax.training.run_config import RunConfig as RunConfig
 from a2g_jax.training.run_file import (
     FORMAT,
     RUN_FILE,
@@ -34,143 +32,6 @@ from a2g_jax.training.run_file import (
     run_folder,
     split_settings,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Perceptual:
-    """The frozen feature network of a perceptual loss."""
-
-    fingerprint: str
-    """SHA-256 of its weights."""
-    features: Callable[[Array], list[Array]] | None = None
-    """Poses (B, T, R, D) to features of each block (B, T, width), differentiable; None in a finished run, since only
-    training needs them."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunConfig:
-    """The description of a run: everything but its weights."""
-
-    model: str
-    preset: str
-    model_config: Any
-    train_config: TrainConfig
-    fps: float
-    mel: MelConfig
-    space: PoseSpace
-    """The body, and the kind of numbers that its poses are written in."""
-    statistics: dict[str, Statistics]
-    """``audio``, ``pose`` and ``root`` of the corpus's training split."""
-    corpus: dict[str, Any]
-    """Fingerprint, recipe, length, emotions and speakers of the corpus."""
-    perceptual: Perceptual | None = None
-    """The feature network of a perceptual loss."""
-    sampling: Any = None
-    """Settings of generation; None for those of the preset."""
-
-    @property
-    def entry(self) -> Entry:
-        """The model's own description."""
-        return find_model(self.model)
-
-    @property
-    def sampling_settings(self) -> Any:
-        """Settings of generation."""
-        return self.entry.sampling_preset(self.preset) if self.sampling is None else self.sampling
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The skeleton of the generated motion.
-
-        Raises:
-            InputError: the model generates keypoints or directions.
-        """
-        if not self.space.has_rotations:
-            raise InputError(
-                f"the run of {self.model} was trained on {self.space.noun}, which have no skeleton to animate; train on"
-                " a corpus of rotations (a2g prepare --pose 6d), or score it with 'a2g evaluate'."
-            )
-        return self.space.skeleton
-
-    @classmethod
-    def of(
-        cls,
-        model: str,
-        preset: str,
-        model_config: Any,
-        train_config: TrainConfig,
-        corpus: Corpus,
-        perceptual: Perceptual | None = None,
-    ) -> "RunConfig":
-        """The run of a model on a corpus.
-
-        Raises:
-            InputError: the model does not take such poses.
-        """
-        if poses := find_model(model).poses:
-            corpus.require_pose(*poses)
-        about = {
-            "fingerprint": corpus.fingerprint,
-            "recipe": corpus.recipe,
-            "seconds": corpus.frames / corpus.fps,
-            "emotions": list(corpus.emotions),
-            "speakers": list(corpus.speakers),
-        }
-        return cls(
-            model=model,
-            preset=preset,
-            model_config=model_config,
-            train_config=train_config,
-            fps=corpus.fps,
-            mel=corpus.mel,
-            space=corpus.space,
-            statistics=corpus.statistics,
-            corpus=about,
-            perceptual=perceptual,
-        )
-
-    def data(self) -> Data:
-        """The properties of the corpus that the model is built for."""
-        return Data(
-            self.space,
-            self.fps,
-            self.mel.width,
-            self.statistics["pose"],
-            tuple(self.corpus.get("emotions", ())),
-            tuple(self.corpus.get("speakers", ())),
-            None if self.perceptual is None else self.perceptual.features,
-            self.mel.sample_rate,
-        )
-
-    def build(self) -> Model:
-        """The model's functions."""
-        model: Model = self.entry.builder()(self.model_config, self.data(), self.sampling_settings)
-        return model
-
-    def with_sampling(self, **changes: Any) -> "RunConfig":
-        """The run with other settings of generation.
-
-        Raises:
-            InputError: a setting that the model does not have, or a value out of range.
-        """
-        known = [field.name for field in fields(self.sampling_settings)]
-        for name in changes:
-            if name not in known:
-                raise InputError(
-                    f"{self.model}: has no setting of generation {name!r}; it has: {', '.join(known) or 'none'}."
-                )
-        return replace(self, sampling=replace(self.sampling_settings, **changes))
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A trained model with all that it needs."""
-
-    config: RunConfig
-    params: Params
-    summary: Summary
-    steps: int
-    """Training steps behind the weights."""
 
 
 def save_run(folder: str | os.PathLike[str], run: Run) -> None:
@@ -252,9 +113,9 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     except InputError:
         raise
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        what = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
+        reason = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
         raise InputError(
-            f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {what}); restore it or train again."
+            f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {reason}); restore it or train again."
         ) from None
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
@@ -265,12 +126,12 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
 
 
 def demo_run() -> Run:
-    """The trained Audio2Gestures that is shipped with the package: ``demo`` on the command line."""
+    """The trained Audio2Gestures shipped with the package: ``demo`` on the command line."""
     return open_run("demo")
 
 
 def demo_flow_run() -> Run:
-    """The trained flow that is shipped with the package: ``demo-flow`` on the command line."""
+    """The trained flow shipped with the package: ``demo-flow`` on the command line."""
     return open_run("demo-flow")
 
 
@@ -290,7 +151,7 @@ def demo_feature_run() -> tuple[Run, str]:
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:
-    """Shapes against the model's own, before anything is computed."""
+    """Compare shapes with the model's own, before anything is computed."""
     import jax
 
     expected = flatten_dict(jax.eval_shape(model.init, jax.random.key(0)), sep="/")

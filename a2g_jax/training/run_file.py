@@ -1,4 +1,4 @@
-"""The description of a run as it lies in its folder; importable without JAX."""
+"""The description of a run in its folder, ``run.json``; importable without JAX."""
 
 import os
 from dataclasses import fields
@@ -20,7 +20,7 @@ SHIPPED = {"demo": "demo", "demo-flow": "demo_flow"}
 #: The same of the shipped feature network.
 SHIPPED_FEATURES = {"demo": "demo_features"}
 
-#: Settings of generation that runs of version 0.1 kept among those of the model, by their names then.
+#: Sampling settings that runs of version 0.1 kept among those of the model, by their names then.
 _MOVED = {"control_curves": "controls"}
 
 
@@ -44,12 +44,12 @@ def read_description(folder: Path) -> dict[str, Any]:
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
     if values.get("version") != VERSION:
-        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it anew.")
+        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it again.")
     return values
 
 
 def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Settings of the model and of generation; in runs of version 0.1 both stand together.
+    """Settings of the model and of sampling, which runs of version 0.1 store together.
 
     Args:
         values: the contents of ``run.json``.

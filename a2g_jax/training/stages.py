@@ -1,4 +1,4 @@
-"""The stages of a training on the common count of steps."""
+"""The stages of a training on a common count of steps."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class StageSpan(NamedTuple):
 
 
 def stage_spans(model: Model, config: TrainConfig) -> tuple[StageSpan, ...]:
-    """The stages one after another.
+    """The stages one after another, with their steps.
 
     Raises:
         InputError: stages of one name, more than one without a number of steps, or parameters that do not exist.

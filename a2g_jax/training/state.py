@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import optax
-from jaxtyping import Array, Float, Int, Key
+from jaxtyping import Array, Bool, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.models.base import Loss, Model, Params, Stage, Update
@@ -25,7 +25,7 @@ class TrainState(NamedTuple):
     """Steps done, over all stages."""
     key: Key[Array, ""]
     """The run's key; never changes, and is folded with the step."""
-    good: Array
+    good: Bool[Array, ""]
     """Whether every loss and gradient so far was finite."""
 
 
@@ -52,7 +52,7 @@ def trained(update: Update, params: Params) -> Params:
 
 
 def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int) -> TrainState:
-    """A run at step 0, with the optimisers of all stages."""
+    """The state at step 0, with the optimisers of all stages."""
     key = jax.random.key(seed)
     # Step numbers count up from 0, so the initial weights take the one number that no step has.
     params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
@@ -65,7 +65,7 @@ def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int) -> TrainSt
 
 
 def step_keys(key: Key[Array, ""], step: Int[Array, ""]) -> Key[Array, " 3"]:
-    """Keys of one step: for the choice of clips, their augmentation, and the model."""
+    """Keys of one step, for the choice of clips, their augmentation, and the model."""
     return jax.random.split(jax.random.fold_in(key, step), 3)
 
 
@@ -110,7 +110,7 @@ def _gradient(update: Update, params: Params, key: Key[Array, ""], batch: Batch,
 
 
 def joint_loss(stage: Stage) -> Loss:
-    """The sum of the losses of a stage's updates, with the terms of all."""
+    """A loss: the sum of those of a stage's updates, with the terms of all."""
 
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]

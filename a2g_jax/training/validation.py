@@ -1,4 +1,4 @@
-"""Figures of a training: the validation loss, and the summary of the latent space."""
+"""The validation loss of a training, and the summary of the latent space."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -45,21 +45,21 @@ def validate(
     split: str = "validation",
     stage: Stage | None = None,
 ) -> dict[str, float]:
-    """Loss terms on a held-out split with a fixed key, and the reconstruction beside the mean pose.
+    """Loss terms on a held-out split with a fixed key, and errors of the reconstruction and of the mean pose.
 
-    These are mean distances of joints in cm (``reconstruction_cm``, ``mean_pose_cm``), or for poses without a skeleton
+    Errors are mean distances of joints in cm (``reconstruction_cm``, ``mean_pose_cm``), or for poses without a skeleton
     mean distances of rows in their own unit (``reconstruction_error``, ``mean_pose_error``).
 
     Empty when every stretch of the split is shorter than a clip.
 
     Args:
-        stage: whose loss is taken; the last one of the model if None.
+        stage: its loss is computed; the last stage of the model if None.
     """
     totals: dict[str, float] = {}
     count = 0
     chosen, mean_pose = stage or model.stages[-1], config.statistics["pose"].mean
     loss = jax.jit(chosen.validation_loss or joint_loss(chosen))
-    rebuild = jax.jit(lambda *given: _rebuild(model.reconstruct, config.space, *given))
+    rebuild = jax.jit(lambda *inputs: _rebuild(model.reconstruct, config.space, *inputs))
     for number, batch in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
         value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
         figures = {"loss": value, **terms}

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
@@ -48,7 +48,7 @@ def wrist_heights(motion: Motion) -> Float[np.ndarray, "T 2"]:
     Raises:
         ValueError: a rig without wrists.
     """
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     if body is None:
         raise ValueError("expected a body with two wrists")
     positions = motion.positions()

@@ -64,7 +64,7 @@ def wrist_speeds(space: PoseSpace, pose: np.ndarray, fps: float) -> np.ndarray:
 def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     """Shares and agreements of exchanged codes with 95 % intervals over pairs."""
     space, fps = corpus.space, corpus.fps
-    networks = Codec(run.config.model_config, run.config.data())
+    codec = Codec(run.config.model_config, run.config.data())
     clips, features = clips_of(corpus)
     speeds = [wrist_speeds(space, clip, fps) for clip in clips]
     sides = np.array([dominance(one) for one in speeds])
@@ -77,16 +77,16 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
 
     @jax.jit
     def decode(pose_s, pose_i):
-        shared = networks.encode_motion(run.params, pose_s)[0].mean
-        specific = networks.encode_motion(run.params, pose_i)[1]
-        return networks.decode(run.params, networks.to_time(shared), networks.to_time(specific.mean))
+        shared = codec.encode_motion(run.params, pose_s)[0].mean
+        specific = codec.encode_motion(run.params, pose_i)[1]
+        return codec.decode(run.params, codec.to_time(shared), codec.to_time(specific.mean))
 
     @jax.jit
     def generate(audio, pose_i):
-        shared = networks.encode_audio(run.params, audio).mean
-        specific = networks.encode_motion(run.params, pose_i)[1]
-        mapped = networks.map_noise(run.params, code_noise(jax.random.key(seed), networks.to_time(specific.mean)))
-        return networks.decode(run.params, networks.to_time(shared), networks.to_time(mapped.mean))
+        shared = codec.encode_audio(run.params, audio).mean
+        specific = codec.encode_motion(run.params, pose_i)[1]
+        mapped = codec.map_noise(run.params, code_noise(jax.random.key(seed), codec.to_time(specific.mean)))
+        return codec.decode(run.params, codec.to_time(shared), codec.to_time(mapped.mean))
 
     firsts, seconds = [a for a, _ in pairs], [b for _, b in pairs]
     made = np.asarray(decode(clips[firsts], clips[seconds]))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import interpolate, ndimage, signal
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 
@@ -39,7 +39,7 @@ def joint(positions: np.ndarray, name: str) -> np.ndarray:
 
 def body_positions(motion: Motion) -> np.ndarray:
     """(T, 22, 3) positions of the body joints of any rig that has them."""
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     if body is None:
         raise ValueError("Expected a rig with the 22 body joints.")
     return motion.positions()[:, list(body)]
@@ -122,7 +122,7 @@ def statistics(motion: Motion) -> np.ndarray:
     quantiles = [np.percentile(derivative(moves.wrists, order), (50, 90), axis=0).ravel() for order in (1, 2, 3)]
     quantiles += [np.percentile(derivative(moves.head, order), (50, 90)) for order in (1, 2, 3)]
     height = joint(positions, "Neck") - joint(positions, "Pelvis")
-    nose = motion.world_rotations()[:, find_body(motion.skeleton)[BODY_JOINTS.index("Head")], :, 2]
+    nose = motion.world_rotations()[:, find_body_joints(motion.skeleton)[BODY_JOINTS.index("Head")], :, 2]
     collars = joint(positions, "L_Shoulder") + joint(positions, "R_Shoulder") - 2 * joint(positions, "Neck")
     elbows = np.concatenate(
         [joint(positions, f"{side}_Elbow") - joint(positions, f"{side}_Shoulder") for side in "LR"], axis=1

@@ -105,15 +105,15 @@ def _close(ours, theirs, tolerance):
 
 def test_networks_agree():
     data, params, batch, key, twin = _setting(np.float32)
-    networks = Codec(CONFIG, data)
+    codec = Codec(CONFIG, data)
     close = partial(_close, tolerance=1e-4)
 
     @jax.jit
     def ours(params, batch):
-        audio = networks.encode_audio(params, batch.audio)
+        audio = codec.encode_audio(params, batch.audio)
         noise = jax.random.normal(key, audio.mean.shape)
-        motion, mapped = networks.encode_motion(params, batch.pose), networks.map_noise(params, noise)
-        return audio, noise, motion, mapped, networks.decode(params, noise, audio.mean)
+        motion, mapped = codec.encode_motion(params, batch.pose), codec.map_noise(params, noise)
+        return audio, noise, motion, mapped, codec.decode(params, noise, audio.mean)
 
     audio, noise, motion, mapped, pose = ours(params, batch)
     theirs = twin.audio_encoder(_channels_second(batch.audio))
@@ -183,8 +183,8 @@ def test_variants_agree(name):
 def test_encoders_agree(name):
     config = VARIANTS[name]
     data, params, batch, _, twin = _setting(np.float32, config)
-    networks = Codec(config, data)
-    ours = jax.jit(lambda p, b: (networks.encode_audio(p, b.audio), networks.encode_motion(p, b.pose)))(params, batch)
+    codec = Codec(config, data)
+    ours = jax.jit(lambda p, b: (codec.encode_audio(p, b.audio), codec.encode_motion(p, b.pose)))(params, batch)
     theirs = (
         twin._encode(twin.audio_encoder, _channels_second(batch.audio)),
         twin._encode(twin.motion_encoder, _torch(batch.pose).flatten(2).transpose(1, 2)),

@@ -32,7 +32,7 @@ SMALL = StylizedFlowConfig(
     embedding_channels=4,
 )
 MEL = MelConfig(bands=8)
-#: For each way to write poses down, another model, as compiling is what costs.
+#: Another model for each kind of pose, as compiling is expensive.
 MODELS = {
     "6d": SMALL,
     "exponential": replace(SMALL, cell="lstm", freedom=0.0, global_channels=0),

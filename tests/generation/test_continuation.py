@@ -1,4 +1,4 @@
-"""Clips continued from their first poses: what is given is heeded, and nothing depends on the company."""
+"""Clips continued from their first poses: conditioned on these, and independent of the other clips."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_shapes_and_that_a_clip_does_not_depend_on_the_others():
     assert np.abs(made[0, 0] - made[1, 0]).max() > 1e-2
 
 
-def test_the_poses_before_are_heeded_and_those_behind_are_not():
+def test_it_depends_on_the_poses_before_and_not_on_those_after():
     audio, pose = clips(1)
     run = run_of("exponential")
     made = continue_clips(run, audio, pose, FIRST, LAST, samples=1)

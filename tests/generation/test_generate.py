@@ -1,4 +1,4 @@
-"""Generation: exact lengths, seeds, windows, and roots that stand."""
+"""Generation: exact lengths, seeds, windows, and planted roots."""
 
 import jax
 import numpy as np
@@ -60,7 +60,7 @@ def test_windows_leave_no_seam(generator):
     np.testing.assert_allclose(windowed.rotations, whole.rotations, atol=1e-5)
 
 
-def test_no_new_length_compiles_anew(generator):
+def test_no_new_length_compiles_again(generator):
     generator.generate(_SPEECH, 1)
     compiled = generator.engine._sample._cache_size()
     for seconds in (1.0, 2.5, 5.9):
@@ -110,7 +110,7 @@ def test_formats():
 
 
 def test_edits_of_bands_from_the_command_line(tmp_path, capsys):
-    """Flags change the motion as the setting does; what is no edit is refused before anything is written."""
+    """Flags change the motion as the setting does; an invalid edit is refused before anything is written."""
     write_audio(tmp_path / "speech.wav", talk(5.0, 3).audio, 16000)
     command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "1", "--formats", "npz"]
 
@@ -124,7 +124,7 @@ def test_edits_of_bands_from_the_command_line(tmp_path, capsys):
     assert np.abs(np.diff(still, axis=0)).mean() < 0.5 * np.abs(np.diff(plain, axis=0)).mean()
     capsys.readouterr()
     for flags, message in (
-        (["--edit", "specific swap 0:4"], "which only Python can give"),
+        (["--edit", "specific swap 0:4"], "from Python only"),
         (["--keep-shared", "300"], "there are 128 bands"),
         (["--edit", "louder"], "it begins with 'shared' or 'specific'"),
     ):

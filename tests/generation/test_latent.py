@@ -1,4 +1,4 @@
-"""The latent space as notebooks use it, on the weights that come along."""
+"""The latent space as notebooks use it, on the shipped weights."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_codes_decode_to_what_generation_gives(space, speech):
 
 
 def test_a_motion_comes_back(space, speech):
-    """Through the codes and back the wrists stay within a few centimetres; another motion is farther."""
+    """Decoded from its codes, the wrists are within a few centimetres; another motion is farther."""
     motion = speech.motion
     back = space.to_motion(space.from_motion(motion))
     other = talk(6.0, 12).motion

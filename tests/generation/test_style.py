@@ -1,4 +1,4 @@
-"""Styles and seeds of the flow: what is encoded comes back, shares and blends keep their laws, no seams."""
+"""Styles and seed poses of the flow: encoding inverts generation; statistics of shares and blends; no seams."""
 
 from dataclasses import replace
 from functools import cache
@@ -26,8 +26,8 @@ def space_of(pose="6d", window=128):
     return FlowSpace(run_of(pose), window)
 
 
-def held(rows, frames=3):
-    """The first pose as often as the run wants a history."""
+def repeated(rows, frames=3):
+    """The first pose, repeated for the length of the history."""
     return np.repeat(rows[:1], frames, axis=0)
 
 
@@ -36,12 +36,12 @@ def test_a_clip_comes_back_from_its_latents(pose):
     space, own = space_of(pose), clip(pose)
     style = Style(space.encode_rows(own.rows, own.features))
     assert style.latents.shape == (90, own.rows[0].size)
-    (made,) = space.rows(own.features, 1, seed=4, style=style, seed_rows=held(own.rows))
+    (made,) = space.rows(own.features, 1, seed=4, style=style, seed_rows=repeated(own.rows))
     np.testing.assert_allclose(made, own.rows, atol=1e-3)
-    # Neither another history nor other speech gives it back: both are listened to.
+    # Another history or other speech does not reproduce it: both are conditions.
     (elsewhere,) = space.rows(own.features, 1, seed=4, style=style)
     assert np.abs(elsewhere[:5] - own.rows[:5]).max() > 1e-2
-    (other,) = space.rows(clip(pose, seed=2).features, 1, seed=4, style=style, seed_rows=held(own.rows))
+    (other,) = space.rows(clip(pose, seed=2).features, 1, seed=4, style=style, seed_rows=repeated(own.rows))
     assert np.abs(other - own.rows).max() > 1e-2
 
 
@@ -59,15 +59,15 @@ def test_a_motion_comes_back_and_one_of_another_rate_is_brought_to_the_runs():
 
 
 def test_seeds_are_the_history():
-    """The draws of a sample are found again with the poses that it went on from, and with no others."""
+    """Encoding recovers the draws of a sample with its seed poses, and with no others."""
     # Not of 6D poses, which are made valid after they are drawn.
     space, own, longer = (of("exponential") for of in (space_of, clip, lambda pose: clip(pose, 120, 2)))
     (plain,) = space.rows(own.features, 1, seed=9)
     (made,) = space.rows(own.features, 1, seed=9, seed_rows=longer.rows)
     mean = np.asarray(space.run.config.statistics["pose"].mean)[None]
-    drawn = space.encode_rows(plain, own.features, before=held(mean))
+    drawn = space.encode_rows(plain, own.features, before=repeated(mean))
     np.testing.assert_allclose(space.encode_rows(made, own.features, before=longer.rows[-3:]), drawn, atol=2e-2)
-    for wrong in (held(mean), longer.rows[-4:-1], longer.rows[-3:][::-1]):
+    for wrong in (repeated(mean), longer.rows[-4:-1], longer.rows[-3:][::-1]):
         assert np.abs(space.encode_rows(made, own.features, before=wrong) - drawn)[:3].max() > 5e-2
 
 
@@ -107,18 +107,18 @@ def test_a_sample_is_the_same_however_many_there_are():
     assert np.abs(next(space.rows(own.features, 1, 8, style)) - many[0]).max() > 1e-2
 
 
-def test_controls_are_the_clips_own_in_encoding_and_those_that_are_asked_for_in_generating():
+def test_controls_are_the_clips_own_in_encoding_and_the_requested_ones_in_generation():
     own, plain = clip("exponential"), space_of("exponential")
     space = FlowSpace(run_of("exponential", ("height",)), 128)
     moved = own.rows.copy()
     moved[60:] = moved[60:61]
     change = space.encode_rows(moved, own.features) - space.encode_rows(own.rows, own.features)
-    # An average over seconds is another for the frames before those that changed, too; in pose history it is not.
+    # An average over seconds also changes for the frames before those that changed; the pose history does not.
     assert np.abs(change)[20:50].max() > 1e-4
     change = plain.encode_rows(moved, own.features) - plain.encode_rows(own.rows, own.features)
     assert np.abs(change)[:60].max() < 1e-5
-    (asked,) = Generator(space.run).rows(own.features, 1, seed=2)
-    np.testing.assert_allclose(next(space.rows(own.features, 1, seed=2)), asked, atol=1e-4)
+    (plainly,) = Generator(space.run).rows(own.features, 1, seed=2)
+    np.testing.assert_allclose(next(space.rows(own.features, 1, seed=2)), plainly, atol=1e-4)
 
 
 @given(st.integers(1, 60), st.integers(1, 12))
@@ -132,7 +132,7 @@ def test_there_and_back(frames, length):
 
 
 def latents(seed, frames=50, channels=6):
-    """Of a clip with a style of its own: a mean, and a deviation for every channel."""
+    """Latents of a clip with a style of its own: a mean and a standard deviation for every channel."""
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=(frames, channels)) * rng.uniform(0.3, 1.5, channels) + rng.normal(size=channels)
     return normal.astype(np.float32)
@@ -140,7 +140,7 @@ def latents(seed, frames=50, channels=6):
 
 @given(st.floats(0.0, 1.0), st.sampled_from(["repeat", "statistics"]), st.integers(0, 9))
 def test_a_share_keeps_the_power(share, mode, seed):
-    """What is not the style's is the noise's: clips of power 1 on the whole give latents of power 1."""
+    """The rest of the power is the noise's: clips of average power 1 give latents of power 1."""
     style = Style(latents(seed), mode, share)
     base, gain = drive(style, 50, 6)
     power = np.square(base).mean(axis=0) + np.square(gain).mean(axis=0)
@@ -164,7 +164,7 @@ def test_blends_end_at_their_styles():
         mixed = blend(first, second, share)
         np.testing.assert_array_equal(mixed.latents, end.latents)
         assert (mixed.mode, mixed.share) == ("statistics", 0.6)
-    # And run into them, up to the repetitions of the shorter one.
+    # And converge to them, up to the repetitions of the shorter one.
     near = blend(first, second, 1e-4)
     np.testing.assert_allclose(near.latents[:50], first.latents, atol=0.3)
     np.testing.assert_allclose(blend(first, second, 1 - 1e-4).latents, second.latents, atol=1e-2)
@@ -182,8 +182,8 @@ def test_blends_do_not_shrink(share, seed):
     mixed, length = blend(first, second, share), np.linalg.norm
     assert length(mixed.mean) == pytest.approx((1 - share) * length(first.mean) + share * length(second.mean), rel=1e-3)
     angle = 0.5 * np.pi * share
-    wanted = np.square(np.cos(angle) * first.std) + np.square(np.sin(angle) * second.std)
-    np.testing.assert_allclose(np.square(mixed.std), wanted, rtol=1e-3)
+    expected = np.square(np.cos(angle) * first.std) + np.square(np.sin(angle) * second.std)
+    np.testing.assert_allclose(np.square(mixed.std), expected, rtol=1e-3)
 
 
 def test_opposite_means_meet_in_the_middle():
@@ -236,21 +236,21 @@ def test_from_the_command_line(files, tmp_path, capsys, monkeypatch):
     style = ["--style", "clip.bvh", "--style-audio", "clip.wav", "--style-share", "0.9"]
     blended = ["--style-with", "other.bvh", "--style-mix", "0.3", "--style-mode", "statistics"]
     assert main([*command, *style, *blended, "--seed-clip", "other.bvh"]) == 0
-    told = capsys.readouterr().out
-    assert "other.bvh: encoded with silence: no --style-with-audio names its speech" in told
-    assert "clip.bvh: heard" not in told
+    output = capsys.readouterr().out
+    assert "other.bvh: encoded with silence; give its speech with --style-with-audio" in output
+    assert "clip.bvh: encoded" not in output
     page = (tmp_path / "out" / "index.html").read_text()
-    assert "style of clip.bvh and other.bvh (0.3), share 0.9, statistics, going on from other.bvh" in page
+    assert "style of clip.bvh and other.bvh (0.3), share 0.9, statistics, continuing other.bvh" in page
     first, second = (np.load(tmp_path / "out" / f"sample_0{number}.npz")["rotations"] for number in (0, 1))
     assert first.shape == (90, 22, 3, 3)
     assert np.abs(first - second).max() > 1e-2
     assert (tmp_path / "out" / "sample_01.bvh").exists()
-    # The flags are what the modules do with the same numbers.
+    # The flags give the same motion as the modules with the same numbers.
     space, own = FlowSpace(run_of()), clip()
     ours = Style(space.encode(own.motion, own.audio), "statistics", 0.9)
     mixed = blend(ours, Style(space.encode(clip(seed=2).motion)), 0.3)
     made = space.generate(talk(3.0, 8).audio, 2, style=mixed, seed_poses=clip(seed=2).motion)
-    # A clip is turned a little to face as the run does, and BVH has six decimals.
+    # A clip is turned a little to the facing direction of the run, and BVH has six decimals.
     assert np.abs(made[1].rotations - second).mean() < 0.1 * np.abs(first - second).mean()
 
 
@@ -263,7 +263,7 @@ def test_from_the_command_line(files, tmp_path, capsys, monkeypatch):
         (["--style", "clip.bvh", "--style-audio", "nowhere.wav"], "nowhere.wav"),
         (["--style", "blink.bvh"], "--style blink.bvh: lasts 0.07 s; give a clip of 1 s or more."),
         (["--seed-clip", "blink.bvh"], "--seed-clip blink.bvh: has 2 frames at the run's 30 fps; give a clip of 3"),
-        (["--style", "clip.bvh", "--style-share", "1"], "--style-share 1: leaves nothing to chance"),
+        (["--style", "clip.bvh", "--style-share", "1"], "--style-share 1: draws nothing"),
         (["--style", "clip.bvh", "--style-audio", "speech.wav", "--pin", "clip.bvh@1"], "--pin is for runs of audio"),
     ],
 )

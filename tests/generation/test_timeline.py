@@ -34,7 +34,7 @@ def part(motion, first, stop):
 
 @pytest.fixture(scope="module")
 def clip():
-    """Two seconds of somebody's gestures."""
+    """Two seconds of gestures."""
     return part(talk(10.0, 77, speaker="felix").motion, 90, 150)
 
 
@@ -95,7 +95,7 @@ def test_codes_are_the_clips_where_it_is_pinned_and_the_drawn_ones_elsewhere(cli
 
 
 def test_close_pins_do_not_reach_into_each_other(clip, speech):
-    """Whatever lies between them, each clip's own stretch has its own code alone."""
+    """Each clip's own stretch has only its own code."""
     space = LatentSpace(demo_run())
     codes = space.from_audio(speech.audio)
     pins = [Pin("one", 1.0, clip), Pin("two", 3.1, clip)]
@@ -137,7 +137,7 @@ def test_a_part_of_a_clip(clip, tmp_path):
     pin = read_pin(f"{tmp_path / 'wave.bvh'}@1+0.5", skeleton, 30.0)
     assert pin.motion.frames == 15
     np.testing.assert_allclose(pin.motion.rotations, clip.rotations[:15], atol=1e-4)
-    with pytest.raises(InputError, match=r"lasts 2\.00 s; ask for no more"):
+    with pytest.raises(InputError, match=r"lasts 2\.00 s; request no more"):
         read_pin(f"{tmp_path / 'wave.bvh'}@1+2.5", skeleton, 30.0)
 
 
@@ -173,7 +173,7 @@ def rotation_y(degrees):
     return np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
 
 
-def test_a_clip_at_the_beginning_has_one_seam_and_a_wide_blend_is_seen_whole(speech):
+def test_a_clip_at_the_beginning_has_one_seam_and_a_wide_blend_is_measured_whole(speech):
     motion = speech.motion
     rough = replace(motion, rotations=motion.rotations.copy())
     # A jolt 0.6 s before frame 60, and one right at the motion's beginning.

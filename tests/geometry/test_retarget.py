@@ -23,7 +23,7 @@ from rigs_for_tests import (
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_skeleton
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh import read_bvh
@@ -259,7 +259,7 @@ def test_what_is_missing_is_named():
 def test_real_rigs_there_and_back(shared, name):
     motion = read_bvh(shared / name)
     rig = find_rig(motion)
-    body = find_body(motion.skeleton)
+    body = find_body_joints(motion.skeleton)
     assert set(body) <= set(rig.roles.values()) | set(rig.spine)
     others = {
         "talker": TALKER_SKELETON,

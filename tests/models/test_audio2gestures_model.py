@@ -147,7 +147,7 @@ def test_terms_of_weight_zero_cost_no_gradient(params, batch):
 
 @pytest.fixture(scope="module")
 def double():
-    """In double precision: params -> gradient of any weighting of the terms, and the terms."""
+    """A function in double precision: params to the gradient of any weighting of the terms, and the terms."""
     with jax.enable_x64(True):
         batch, params = make_batch(np.float64), make_params(np.float64)
 

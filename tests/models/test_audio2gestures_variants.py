@@ -1,4 +1,4 @@
-"""Backbones, the DCT latent space, variants without a part, structured losses, and poses without a skeleton."""
+"""Backbones, the DCT latent space, ablations, structured losses, and poses without a skeleton."""
 
 from dataclasses import replace
 
@@ -104,15 +104,15 @@ def test_every_parameter_learns(name):
 
 
 def test_exponential_maps_are_the_rotations_they_stand_for():
-    """The losses on poses see the same body whichever way its rotations are written down."""
+    """The losses on poses are the same for both ways to write rotations."""
     pose = jnp.asarray(np.random.default_rng(4).normal(scale=0.5, size=(2, FRAMES, JOINTS, 3)), jnp.float32)
-    networks = Codec(BASE, EXPONENTIAL)
-    rotations, places = networks.positions(pose)
+    codec = Codec(BASE, EXPONENTIAL)
+    rotations, places = codec.positions(pose)
     expected = Rotation.from_rotvec(np.asarray(pose).reshape(-1, 3)).as_matrix().reshape(*pose.shape, 3)
     np.testing.assert_allclose(rotations, expected, atol=1e-5)
     same = Codec(BASE, DATA).positions(matrix_to_6d(jnp.asarray(expected, jnp.float32)))
     np.testing.assert_allclose(places, same[1], atol=1e-5)
-    np.testing.assert_array_equal(networks.valid(pose, rotations), pose)
+    np.testing.assert_array_equal(codec.valid(pose, rotations), pose)
 
 
 @pytest.mark.parametrize("name", ["transformer", "dct", "no split", "no mapping"])
@@ -133,7 +133,7 @@ def test_windows_give_the_motion_of_one_pass(name):
 
 
 def test_a_gru_forgets_within_its_context():
-    """Its memory has no end; what is left of it after the context that generation gives is far below a millimetre."""
+    """Its memory is unbounded; beyond the context of generation its effect is far below a millimetre."""
     model = build(replace(BASE, **VARIANTS["gru"]), DATA)
     params = params_of(model)
     random = np.random.default_rng(8)
@@ -147,17 +147,17 @@ def test_a_gru_forgets_within_its_context():
 
 def test_the_shared_code_of_the_dct_space_is_certain_and_the_specific_one_has_a_spread_for_each_band():
     config = replace(BASE, latent="dct")
-    networks = Codec(config, DATA)
+    codec = Codec(config, DATA)
     params = params_of(build(config, DATA))
-    shared, specific = networks.encode_motion(params, batch(DATA, 2 * FRAMES).pose)
+    shared, specific = codec.encode_motion(params, batch(DATA, 2 * FRAMES).pose)
     np.testing.assert_array_equal(shared.sample(jax.random.key(0)), shared.mean)
     assert np.asarray(specific.log_variance).std(axis=1).min() > 0
     # The shared head is linear, so it is the same in time and in bands.
-    alone = networks.encode_motion(params, batch(DATA, 2 * FRAMES).pose[:, FRAMES:])[0]
+    alone = codec.encode_motion(params, batch(DATA, 2 * FRAMES).pose[:, FRAMES:])[0]
     np.testing.assert_allclose(shared.mean[:, FRAMES:], alone.mean, atol=1e-5)
-    np.testing.assert_allclose(block_dct(networks.to_time(shared.mean), FRAMES), shared.mean, atol=1e-5)
+    np.testing.assert_allclose(block_dct(codec.to_time(shared.mean), FRAMES), shared.mean, atol=1e-5)
     with pytest.raises(ValueError, match="multiple of 32 frames"):
-        networks.encode_motion(params, batch(DATA, 40).pose)
+        codec.encode_motion(params, batch(DATA, 40).pose)
 
 
 def test_edits_are_made_in_generation_alone():
@@ -224,7 +224,7 @@ def test_refused(changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"edits": ("shared swap 0:3",)}, "only Python can give"),
+        ({"edits": ("shared swap 0:3",)}, "from Python only"),
         ({"edits": ("shared blur",)}, "for example"),
         ({"keep_shared": 33}, "there are 32 bands"),
         ({"noise_frames": 0}, "--noise-frames: expected 1 or more"),

@@ -1,4 +1,4 @@
-"""Classifiers of emotions: they learn from what they look at, and from nothing else."""
+"""Classifiers of emotions: they learn from their input only."""
 
 import jax
 import jax.numpy as jnp
@@ -31,16 +31,16 @@ def batch(seed, clips=24):
     return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32), jnp.asarray(emotion, jnp.int32))
 
 
-@pytest.mark.parametrize("looks_at", ["motion", "audio"])
-def test_it_learns_emotions_from_its_input_alone(looks_at):
-    config = EmotionClassifierConfig(looks_at, channels=(16, 16), hidden=16, dropout=0.1, clip_frames=20)
+@pytest.mark.parametrize("source", ["motion", "audio"])
+def test_it_learns_emotions_from_its_input_only(source):
+    config = EmotionClassifierConfig(source, channels=(16, 16), hidden=16, dropout=0.1, clip_frames=20)
     model = build(config, DATA)
     params = model.init(jax.random.key(0))
     optimiser = optax.adam(5e-3)
 
     @jax.jit
-    def step(params, state, seen, key):
-        gradient = jax.grad(lambda p: joint_loss(model.stages[0])(p, key, seen, jnp.int32(0))[0])(params)
+    def step(params, state, clips, key):
+        gradient = jax.grad(lambda p: joint_loss(model.stages[0])(p, key, clips, jnp.int32(0))[0])(params)
         updates, state = optimiser.update(gradient, state)
         return optax.apply_updates(params, updates), state
 
@@ -53,24 +53,25 @@ def test_it_learns_emotions_from_its_input_alone(looks_at):
         return float(model.stages[0].validation_loss(params, jax.random.key(0), clips, jnp.int32(0))[1]["accuracy"])
 
     assert right(held) > 0.9
-    other = "audio" if looks_at == "motion" else "pose"
+    other = "audio" if source == "motion" else "pose"
     assert right(held._replace(**{other: jnp.zeros_like(getattr(held, other))})) == right(held)
 
 
 def test_dropout_acts_in_training_only():
     config = EmotionClassifierConfig(channels=(8,), hidden=8, dropout=0.5, clip_frames=20)
     model = build(config, DATA)
-    params, seen = model.init(jax.random.key(0)), batch(0)
+    params, clips = model.init(jax.random.key(0)), batch(0)
     losses = {
-        float(joint_loss(model.stages[0])(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)
+        float(joint_loss(model.stages[0])(params, jax.random.key(seed), clips, jnp.int32(0))[0]) for seed in range(3)
     }
     held = {
-        float(model.stages[0].validation_loss(params, jax.random.key(seed), seen, jnp.int32(0))[0]) for seed in range(3)
+        float(model.stages[0].validation_loss(params, jax.random.key(seed), clips, jnp.int32(0))[0])
+        for seed in range(3)
     }
     assert (len(losses), len(held)) == (3, 1)
-    assert classify(config, DATA, params, seen).shape == (24, 3)
+    assert classify(config, DATA, params, clips).shape == (24, 3)
 
 
-def test_one_emotion_is_nothing_to_learn():
+def test_one_emotion_is_refused():
     with pytest.raises(InputError, match=r"the corpus has 1 emotion \(neutral\); prepare one with two or more"):
         build(EmotionClassifierConfig(), DATA._replace(emotions=("neutral",)))

@@ -72,7 +72,7 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
     first, stop = config.history_frames, 8 - config.lookahead_frames
 
     def latents(inner):
-        """Of the whole clip: a pose changes what all frames after it are given, too."""
+        """Latents of the whole clip: a pose also conditions the frames after it."""
         clip = flat.at[:, first:stop].set(inner.reshape(1, stop - first, 4))
         return networks.latents(params, networks.inner(clip), networks.conditioning(params, batch.audio, clip))[
             0
@@ -88,23 +88,23 @@ def test_log_likelihoods_add_up_to_that_of_the_clip_by_the_jacobian(x64, config)
         else stats.multivariate_normal(np.zeros(4))
     )
     expected = prior.logpdf(z).sum() + np.linalg.slogdet(jacobian)[1]
-    score = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
-    assert score.shape == (1, 5)
-    np.testing.assert_allclose(score.sum(), expected, rtol=1e-9)
-    # What an early frame is scored by is a part of the Jacobian: no later frame reaches back into it.
+    density = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
+    assert density.shape == (1, 5)
+    np.testing.assert_allclose(density.sum(), expected, rtol=1e-9)
+    # The density of an early frame is a block of the Jacobian: no later frame affects it.
     blocks = jacobian.reshape(5, 4, 5, 4)
     assert max(np.abs(blocks[t, :, t + 1 :]).max(initial=0.0) for t in range(5)) == 0.0
     parts = prior.logpdf(z) + [np.linalg.slogdet(blocks[t, :, t])[1] for t in range(5)]
-    np.testing.assert_allclose(score[0], parts, rtol=1e-9)
+    np.testing.assert_allclose(density[0], parts, rtol=1e-9)
 
 
-def test_without_noise_the_score_is_what_training_lowers():
+def test_without_noise_it_is_the_training_loss():
     config = replace(SMALL, input_noise=0.0, global_channels=0)
     model, batch = build(config, DATA), jax.tree.map(lambda a: a.astype(jnp.float32), batch_of(3))
     params = jax.jit(model.init)(jax.random.key(0))
     bits, _ = jax.jit(joint_loss(model.stages[0]))(params, jax.random.key(1), batch, jnp.int32(0))
-    score = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
-    np.testing.assert_allclose(-score.mean() / np.log(2), bits, rtol=1e-5)
+    density = jax.jit(model.density.log_likelihood)(params, batch.audio, batch.pose)
+    np.testing.assert_allclose(-density.mean() / np.log(2), bits, rtol=1e-5)
 
 
 def test_sixteen_steps_invert_after_training():

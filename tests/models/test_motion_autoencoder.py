@@ -46,7 +46,7 @@ def test_the_fourth_block_has_the_papers_128_values():
         assert (config.encoder_channels[3], len(config.encoder_channels)) == (128, 5)
 
 
-def test_it_sees_125_frames():
+def test_it_spans_125_frames():
     data = data_of("6d")
     model = build(SMALL, data)
     params = model.init(jax.random.key(0))
@@ -60,7 +60,7 @@ def test_it_sees_125_frames():
 
 
 @pytest.mark.parametrize("representation", ["6d", "exponential", "directions", "keypoints"])
-def test_it_learns_to_give_back_what_it_is_given(representation):
+def test_it_learns_to_reconstruct(representation):
     import optax
 
     data, batch = data_of(representation), batch_of(representation)

@@ -1,4 +1,4 @@
-"""Speech2Gesture: losses and their gradients, the GAN's two sides, windows, clips of any length, learning."""
+"""Speech2Gesture: losses and gradients of both networks, windows, clips of any length, learning."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from a2g_jax.models import find_model
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.models.speech2gesture.config import PRESETS
 from a2g_jax.models.speech2gesture.model import build
-from a2g_jax.models.speech2gesture.networks import generator_halo
+from a2g_jax.models.speech2gesture.networks import translator_halo
 from a2g_jax.training.state import joint_loss
 
 CONFIG = replace(
@@ -96,8 +96,8 @@ def test_terms_and_their_sum(representation, weight):
     np.testing.assert_allclose(total, expected, rtol=1e-5)
 
 
-def test_the_discriminators_scores_make_its_terms():
-    """By the formula of least squares, from scores that a constant discriminator gives."""
+def test_terms_of_a_constant_discriminator():
+    """The least-squares formula with the output of a constant discriminator."""
     model = build(CONFIG, make_data("keypoints"))
     params = make_params(model)
     silent = jax.tree.map(jnp.zeros_like, params["discriminator"])
@@ -124,15 +124,15 @@ def sides():
     return function, params, choose
 
 
-class TestTwoSides:
-    def test_the_discriminators_loss_does_not_move_the_generator(self, sides, x64):
+class TestBothNetworks:
+    def test_the_discriminators_loss_does_not_move_the_translation_network(self, sides, x64):
         function, params, choose = sides
         gradient = function(params, choose("discriminator"))[1]
         assert max(np.abs(leaf).max() for leaf in jax.tree.leaves(gradient["generator"])) == 0
         for path, leaf in jax.tree_util.tree_leaves_with_path(gradient["discriminator"]):
             assert np.abs(leaf).max() > 0, path
 
-    def test_the_generators_losses_do_not_move_the_discriminator(self, sides, x64):
+    def test_the_translation_networks_losses_do_not_move_the_discriminator(self, sides, x64):
         function, params, choose = sides
         gradient = function(params, choose("rotation", "position", "speed", "adversarial"))[1]
         assert max(np.abs(leaf).max() for leaf in jax.tree.leaves(gradient["discriminator"])) == 0
@@ -195,7 +195,7 @@ def test_weight_zero_leaves_the_discriminator_out():
 
 @pytest.mark.parametrize("frames", [1, 14])
 def test_clips_of_any_length(frames):
-    """A clip that is no multiple of the stride gives what the same audio followed by zeros gives."""
+    """A clip that is not a multiple of the stride gives the same motion as its audio followed by zeros."""
     model = build(CONFIG, make_data())
     params = make_params(model)
     audio = make_batch(frames=frames).audio
@@ -232,8 +232,8 @@ def test_samples_do_not_depend_on_windows():
 
 
 @pytest.mark.parametrize("depth", [1, 3])
-def test_halo_is_how_far_an_output_sees(depth):
-    """Not a frame more or less: by the gradient of every output frame with respect to the audio."""
+def test_halo_is_how_far_an_output_depends_on_the_audio(depth):
+    """To the frame: by the gradient of every output frame with respect to the audio."""
     config = replace(CONFIG, depth=depth)
     model = build(config, make_data())
     params = make_params(model)
@@ -244,12 +244,12 @@ def test_halo_is_how_far_an_output_sees(depth):
     def change(frame):
         return jax.grad(lambda a: jnp.sum(jnp.sin(model.condition(params, {}, Condition(a))[frame])))(audio)
 
-    seen = np.abs(np.asarray(jax.jit(jax.vmap(change))(jnp.arange(middle, middle + stride)))).sum(axis=-1) > 0
+    reached = np.abs(np.asarray(jax.jit(jax.vmap(change))(jnp.arange(middle, middle + stride)))).sum(axis=-1) > 0
     reach = 0
-    for offset, row in enumerate(seen):
+    for offset, row in enumerate(reached):
         (places,) = np.nonzero(row)
         reach = max(reach, middle + offset - places[0], places[-1] - middle - offset)
-    assert generator_halo(config) == reach == model.halo
+    assert translator_halo(config) == reach == model.halo
 
 
 def test_the_papers_networks():
@@ -261,7 +261,7 @@ def test_the_papers_networks():
     assert layers(shapes["AudioEncoder_0"]) == 8
     assert shapes["AudioEncoder_0"]["Conv1D_0"]["kernel"].shape == (3, 8 * 256, 256)
     assert layers(shapes["UNet_0"]) == 16
-    assert generator_halo(config) == 107
+    assert translator_halo(config) == 107
 
 
 @pytest.mark.parametrize("representation", ["6d", "keypoints"])

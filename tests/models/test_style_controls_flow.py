@@ -1,4 +1,4 @@
-"""Style controls in the flow: told beside the audio, never hidden, and followed in generation."""
+"""Style controls of the flow: conditioning beside the audio, never masked, and followed in generation."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ SETTINGS = TrainConfig(steps=60, learning_rate=1e-2, clip_value=5.0, clip_norm=1
 
 
 def batch_of(clips=8, frames=20, seed=0):
-    """Arms that each clip holds at an angle of its own, and audio that says nothing of it."""
+    """Arms at an angle of each clip's own, and audio that is independent of it."""
     rng = np.random.default_rng(seed)
     pose = 0.1 * rng.normal(size=(clips, frames, 5, 3))
     level = rng.normal(scale=0.5, size=(clips, 1))
@@ -80,8 +80,8 @@ def generated(trained, *curves, frames=128):
     """Heights of the hands at every frame of a motion."""
     model = build(CONFIG, DATA, StylizedFlowSampling(controls=curves))
     params, summary = trained
-    wanted = percentiles(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
-    given = Condition(batch_of(clips=1, frames=frames, seed=5).audio[0], controls=jnp.asarray(wanted))
+    requests = percentiles(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
+    given = Condition(batch_of(clips=1, frames=frames, seed=5).audio[0], controls=jnp.asarray(requests))
     condition = jax.jit(model.condition)(params, summary, given)
     pose = jax.jit(model.sample)(params, summary, jax.random.key(1), condition, jnp.int32(0))
     return np.asarray(heights_of(pose[None])[0, :, 0])
@@ -89,8 +89,8 @@ def generated(trained, *curves, frames=128):
 
 def test_hands_follow_the_requested_controls(trained):
     low, high = generated(trained, "height=10").mean(), generated(trained, "height=90").mean()
-    wanted = np.percentile(trained[1]["control_mean"], [10, 90])
-    assert high - low > 0.5 * (wanted[1] - wanted[0])
+    target = np.percentile(trained[1]["control_mean"], [10, 90])
+    assert high - low > 0.5 * (target[1] - target[0])
     # Over time: low at first, high at last.
     risen = generated(trained, "height=10@2 90@4")
     assert risen[-1] - risen[0] > 0.5 * (high - low)
@@ -106,14 +106,14 @@ def test_controls_are_those_of_the_frame_itself_and_never_masked():
     assert own.context.shape == (2, 17, 4 * 4 + 2)
     np.testing.assert_allclose(own.context[..., -2:], controls[:, 2:19], atol=1e-4)
     assert not own.history.any()
-    # Those that are given are taken instead, each frame its own; 0.1 m counts as 1.
+    # Requested ones replace them, frame by frame; 0.1 m is scaled to 1.
     rising = jnp.broadcast_to(jnp.arange(20.0)[None, :, None], (2, 20, 2))
     given = conditioning({}, batch.audio, networks.flat(batch.pose), mask, rising)
     np.testing.assert_allclose(given.context[..., -2:], 10.0 * rising[:, 2:19], rtol=1e-6)
 
 
 def test_the_share_of_controls_is_that_of_training(trained):
-    """Controls added to the audio's share give the motion of latents that training would."""
+    """Controls added to the audio's share give the same motion of latents as in training."""
     networks, params = FlowNetworks(CONFIG, DATA), trained[0]
     batch = batch_of(clips=1, frames=64, seed=3)
     z = jax.random.normal(jax.random.key(2), (64, 15))
@@ -153,11 +153,11 @@ def test_requested_values_are_the_same_in_any_window():
         ({"controls": ("speed=50",)}, "controls are: height"),
         ({"controls": ("height=101",)}, "from 0 to 100"),
         ({"controls": ("height=-1",)}, "from 0 to 100"),
-        ({"controls": ("height=nan",)}, "'nan' is no number"),
+        ({"controls": ("height=nan",)}, "'nan' is not a number"),
         ({"controls": ("height",)}, "NAME=PERCENTILE"),
         ({"controls": ("height=",)}, "NAME=PERCENTILE"),
         ({"controls": ("height=10@0 90",)}, "NAME=PERCENTILE"),
-        ({"controls": ("height=10@2 90@1",)}, "seconds that rise"),
+        ({"controls": ("height=10@2 90@1",)}, "seconds in ascending order"),
         ({"controls": ("height=10", "height=20")}, "twice"),
     ],
 )

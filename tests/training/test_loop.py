@@ -94,7 +94,7 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(tmp_path, toy_corpus, toy_
 
 
 def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config):
-    """18 clips make a full batch and a small one; their mean is that of single clips."""
+    """18 clips are a full batch and a small one; their mean is that of single clips."""
     config = toy_run_config()
     model = config.build()
     params = jax.jit(model.init)(jax.random.key(0))
@@ -191,7 +191,7 @@ from a2g_jax.training.run import RunConfig
 import json
 settings = json.loads(Path({settings!r}).read_text())
 corpus = Corpus.open({corpus!r})
-model = from_json(find_model("audio2gestures").config_class, settings["model"], "model")
+model = from_json(find_model("audio2gestures").config, settings["model"], "model")
 config = RunConfig.of("audio2gestures", "tiny", model, from_json(TrainConfig, settings["training"], "training"), corpus)
 train(config, corpus, {out!r}, resume=True, progress=False)
 """
@@ -199,7 +199,7 @@ train(config, corpus, {out!r}, resume=True, progress=False)
 
 @pytest.mark.slow
 def test_killed_at_any_moment_training_ends_the_same(tmp_path, toy_corpus, toy_run_config):
-    """SIGKILL at random moments, in the middle of saves too: the final parameters are equal bit for bit."""
+    """SIGKILL at random moments, also during saves: the final parameters are equal bit for bit."""
     config = toy_run_config(steps=400, checkpoint_every=7, log_every=7)
     settings = tmp_path / "settings.json"
     settings.write_text(
@@ -222,7 +222,7 @@ def test_killed_at_any_moment_training_ends_the_same(tmp_path, toy_corpus, toy_r
     kills = 0
     for _ in range(20):
         process = start(tmp_path / "killed")
-        # Wait until it trains, then a random while.
+        # Wait until it trains, then a random time.
         checkpoints = tmp_path / "killed" / "checkpoints"
         before = (
             max((path.stat().st_mtime for path in checkpoints.glob("*")), default=0.0) if checkpoints.exists() else 0

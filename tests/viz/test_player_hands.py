@@ -4,9 +4,9 @@ import pytest
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
 from a2g_jax.talker.views.upper_body import upper_body_skeleton
-from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.hands import find_fingers
 from a2g_jax.viz.player.roles import find_roles, rest_positions
+from a2g_jax.viz.player.shape import build_shape
 
 BEAT = upper_body_skeleton(TALKER_HANDS_SKELETON)
 
@@ -24,20 +24,20 @@ def test_a_wrist_without_fingers_has_none():
     assert find_fingers(TALKER_SKELETON, TALKER_SKELETON.index("L_Wrist"), rest_positions(TALKER_SKELETON)) == []
 
 
-def finger_shapes(skeleton: Skeleton) -> list:
-    """Thin shapes of skin: bones of fingers."""
-    body = build_body(skeleton)
-    return [shape for shape in body.shapes if shape.tint == "skin" and shape.flat == 1.0 and shape.end_radius < 0.0115]
+def finger_cones(skeleton: Skeleton) -> list:
+    """Thin cones of skin: bones of fingers."""
+    shape = build_shape(skeleton)
+    return [cone for cone in shape.cones if cone.tint == "skin" and cone.flat == 1.0 and cone.end_radius < 0.0115]
 
 
 @pytest.mark.parametrize("skeleton", [TALKER_SKELETON, TALKER_HANDS_SKELETON, BEAT])
 def test_every_body_is_drawn_with_thirty_finger_bones(skeleton):
-    assert len(finger_shapes(skeleton)) >= 30
+    assert len(finger_cones(skeleton)) >= 30
 
 
 def test_drawn_fingers_move_with_their_joints():
-    body = build_body(TALKER_HANDS_SKELETON)
-    used = {int(anchor[0]) for shape in body.shapes for anchor in (shape.start, shape.end) if len(anchor) == 1}
+    shape = build_shape(TALKER_HANDS_SKELETON)
+    used = {int(anchor[0]) for cone in shape.cones for anchor in (cone.start, cone.end) if len(anchor) == 1}
     joints = {index for index, name in enumerate(TALKER_HANDS_SKELETON.names) if name[-1] in "123" and name[1] == "_"}
     assert {j for j in joints if "Spine" not in TALKER_HANDS_SKELETON.names[j]} <= used
 
@@ -46,7 +46,7 @@ def test_an_upper_body_has_a_head_and_an_upright_chest():
     roles = find_roles(BEAT)
     assert BEAT.names[roles.head] == "Neck1"
     assert BEAT.names[roles.neck] == "Neck"
-    assert any(shape.tint == "eye" for shape in build_body(BEAT).shapes)
+    assert any(cone.tint == "eye" for cone in build_shape(BEAT).cones)
 
 
 def test_the_thumb_is_found_without_its_name():

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
 from a2g_jax.generation.engine import WINDOW
-from a2g_jax.generation.generator import speech_features, stand_rotations
+from a2g_jax.generation.generator import plant_rotations, speech_features
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
@@ -25,14 +25,14 @@ Code = Float[Array, "T C"]
 
 @dataclass(frozen=True)
 class Codes:
-    """Both codes of a stretch of motion in time, with whole blocks of context before and after it."""
+    """Both codes of a stretch of motion, in time, with whole blocks of context before and after it."""
 
     shared: Code
     specific: Code
     context: int
-    """Frames before the stretch; it ends before at least as many."""
+    """Frames of context before the stretch; at least as many follow it."""
     frames: int
-    """Of the stretch itself."""
+    """Frames of the stretch itself."""
 
     def bands(self, name: str, points: int = BLOCK) -> Float[np.ndarray, "points C"]:
         """Root mean square of each DCT band over the stretch's blocks.
@@ -48,7 +48,7 @@ class Codes:
 
 
 class LatentSpace:
-    """The codes of speech and motion, and back to motion; compiles once for each number of 1024-frame windows."""
+    """Codes of speech and motion, and motion of codes; compiles once for each number of 1024-frame windows."""
 
     def __init__(self, run: Run) -> None:
         """
@@ -58,11 +58,11 @@ class LatentSpace:
         config = run.config.model_config
         if not isinstance(config, Audio2GesturesConfig) or not config.split:
             raise InputError(
-                f"a run of {run.config.model} has no shared and specific codes; take one of audio2gestures."
+                f"a run of {run.config.model} has no shared and specific codes; use a run of audio2gestures."
             )
         self._skeleton, self._run = run.config.skeleton, run
         self.points: int = config.dct_points
-        #: Settings of generation; their edits are applied by :meth:`edit` alone.
+        #: Sampling settings; their edits are applied by :meth:`edit` only.
         self.sampling: Audio2GesturesSampling = run.config.sampling_settings
         plain = replace(self.sampling, edits=(), keep_shared=None, keep_specific=None)
         codec, model = Codec(config, run.config.data()), run.config.build()
@@ -84,7 +84,7 @@ class LatentSpace:
         self._decode = jax.jit(lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None])[0]))
 
     def from_audio(self, audio: Float[np.ndarray, " N"], seed: int = 0, sample: int = 0) -> Codes:
-        """S_A of speech, and an I_R drawn for it: that of ``a2g generate --seed`` for the sample of this number.
+        """S_A of speech and a drawn I_R: those of ``a2g generate --seed`` for this sample number.
 
         Args:
             audio: mono, at the run's sample rate.
@@ -99,7 +99,7 @@ class LatentSpace:
         return Codes(shared[0], specific[0], self._context, frames)
 
     def from_motion(self, motion: Motion) -> Codes:
-        """S_M and I_M of a motion of the run's skeleton and frame rate; its first and last pose are held around it.
+        """S_M and I_M of a motion of the run's skeleton and frame rate, padded with its first and last pose.
 
         Raises:
             InputError: another skeleton or frame rate.
@@ -115,19 +115,19 @@ class LatentSpace:
         return Codes(shared[0], specific[0], self._context, len(pose))
 
     def to_motion(self, codes: Codes) -> Motion:
-        """g(S, I), with a root that plants the feet."""
+        """The decoded motion g(S, I), with a root that plants the feet."""
         stop = codes.context + codes.frames
         rotations = np.asarray(self._decode(self._params, codes.shared, codes.specific))[codes.context : stop]
-        return stand_rotations(self._run, rotations)
+        return plant_rotations(self._run, rotations)
 
     def edit(self, codes: Codes, *edits: str, other: Codes | None = None) -> Codes:
         """Codes with their DCT bands edited; see :mod:`a2g_jax.models.audio2gestures.edits`.
 
         Args:
-            other: where ``swap`` and ``sample`` take their bands from; at least as long.
+            other: codes from which ``swap`` and ``sample`` take bands; at least as long.
 
         Raises:
-            InputError: a line that is no edit, or one that needs ``other``.
+            InputError: an invalid edit, or one that needs ``other``.
         """
         parsed = [parse_edit(text, self.points) for text in edits]
         if other is None and any(edit.action in ("swap", "sample") for edit in parsed):
@@ -153,5 +153,5 @@ class LatentSpace:
         return replace(codes, specific=other.specific[: len(codes.shared)])
 
     def _after(self, frames: int) -> int:
-        """Context behind, so that all speech up to a window's length shares a compiled program."""
+        """Frames of context after speech: up to whole windows, so that few lengths are compiled."""
         return -frames % WINDOW + self._context

@@ -1,4 +1,4 @@
-"""How closely pins are followed, and how smooth their seams are."""
+"""Report on pinned clips: how closely they are followed, and how smooth their seams are."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,16 +8,16 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.pins import Pin
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.metrics.physical import jerk
 
-#: Seconds on either side of a seam in which its jerk is looked at, where the blend is no wider.
+#: Seconds on either side of a seam in which jerk is measured, unless the blend is wider.
 SEAM = 0.25
-#: A pin counts as followed below this share of what the unpinned motion is away from the clip.
+#: A pin counts as followed if its error is below this share of the unpinned motion's.
 FOLLOWED = 0.5
-#: Most frames of a corpus that are looked at for its percentile.
+#: Most frames of a corpus that its percentile is computed from.
 _MOST = 200_000
 
 
@@ -29,15 +29,15 @@ def local_places(motion: Motion) -> Float[np.ndarray, "T J 3"]:
 
 
 def wrist_jerk(places: Float[np.ndarray, "T J 3"], skeleton: Skeleton, fps: float) -> Float[np.ndarray, " t"]:
-    """The larger of both wrists' jerks, m/s3, three frames fewer; of all joints where there are no wrists."""
+    """Jerk of the faster wrist, m/s3, three values fewer than frames; of the fastest joint if no wrists are found."""
     return np.asarray(jerk(places[:, _wrists(skeleton)], fps)).max(axis=1)
 
 
 def _wrists(skeleton: Skeleton) -> list[int]:
-    body = find_body(skeleton)
-    if body is None:
+    joints = find_body_joints(skeleton)
+    if joints is None:
         return list(range(skeleton.joints))
-    return [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
+    return [joints[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
 
 
 def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
@@ -60,13 +60,13 @@ def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
 def report_pins(
     pins: Sequence[Pin], pinned: Motion, plain: Motion, limit: float, source: str, blend: float = 0.75
 ) -> list[dict[str, Any]]:
-    """For each pin, JSON-able: its place, how far the pinned and the unpinned motion are from it, and its seams' jerk.
+    """A JSON-able record of each pin: its place, the distance of both motions from the clip, and the jerk of its seams.
 
     Args:
         pinned: the motion with the pins; ``plain``: the same sample without.
         limit: jerk that seams should stay below, m/s3.
-        source: whose it is.
-        blend: seconds of blending on either side; a seam is looked at as far as that, and a quarter second at least.
+        source: of the limit, for the report.
+        blend: seconds of blending on either side; jerk is measured that far from a seam, and at least a quarter second.
 
     Returns:
         ``file``, ``start``, ``end`` (s), ``turned`` (degrees), ``error_cm``, ``unpinned_error_cm`` (mean distance of
@@ -86,8 +86,8 @@ def report_pins(
         ]
         error, before = (float(distance.mean()) for distance in distances)
         wrist_error, wrist_before = (float(distance[:, wrists].mean()) for distance in distances)
-        # Before the first and after the last frame; where the motion begins or ends there is nothing to join. Value k
-        # is of frames k to k + 3.
+        # Seams lie before the first and after the last frame of a pin, none at the ends of the motion. Value k is of
+        # frames k to k + 3.
         seams = [at for at in (pin.first, pin.stop) if 0 < at < pinned.frames]
         parts = [jerks[max(0, at - width - 2) : at + width] for at in seams]
         seam = max((float(part.max()) for part in parts if len(part)), default=0.0)
@@ -112,7 +112,7 @@ def report_pins(
 
 
 def describe(row: dict[str, Any]) -> str:
-    """A line about one pin for the terminal."""
+    """A line on one pin for the terminal."""
     followed = "" if row["followed"] else ", NOT FOLLOWED"
     rough = "" if row["smooth"] else ", ROUGH SEAM"
     turned = f", turned by {row['turned']:.0f} degrees" if abs(row["turned"]) >= 1.0 else ""

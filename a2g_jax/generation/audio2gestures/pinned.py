@@ -1,4 +1,4 @@
-"""Samples with clips pinned to their timeline, and the report of how closely these are followed."""
+"""Samples with clips pinned to their timeline, and a report on the pins."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -27,14 +27,14 @@ class Pins:
     texts: tuple[str, ...]
     """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
     blend: float = 0.75
-    """Seconds on either side of a clip."""
+    """Seconds of blending on either side of a clip."""
     shared: float = 0.0
-    """From 0 to 1, how far a clip's own shared code replaces the audio's."""
+    """Share of a clip's own shared code that replaces the audio's, from 0 to 1."""
     corpus: Corpus | None = None
     """Its 99th percentile of wrist jerk limits seams; without one, that of the clips and the unpinned sample."""
 
     def place(self, run: Run, frames: int) -> "Pinned":
-        """The clips on a run's skeleton, in speech of so many frames.
+        """The clips on a run's skeleton, for speech of ``frames`` frames.
 
         Raises:
             InputError: a run without codes, a clip that cannot be used, one that ends too late, or two that overlap.
@@ -52,20 +52,20 @@ class Pins:
 
 @dataclass(frozen=True, eq=False)
 class Pinned:
-    """Clips in their places, ready for samples."""
+    """A sampler with pinned clips."""
 
     request: Pins
     run: Run
     space: LatentSpace
     pins: tuple[Pin, ...]
     limit: float | None
-    """Jerk of the corpus, m/s3."""
+    """Limit of jerk from the corpus, m/s3; None without one."""
 
     reports: list[list[dict[str, Any]]] = field(default_factory=list)
-    """Of each sample that :meth:`stream` has given, by :func:`report_pins`."""
+    """Report on each sample of :meth:`stream` so far, from :func:`report_pins`."""
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
-        """Samples of :meth:`~a2g_jax.generation.generator.Generator.stream` with the pins in them."""
+        """Samples of :meth:`~a2g_jax.generation.generator.Generator.stream` with the pinned clips."""
         edits = self.space.sampling.all_edits
         self.reports.clear()
         for sample in range(samples):
@@ -75,18 +75,18 @@ class Pinned:
             motion = self.space.to_motion(changed)
             limit, source = self.limit, "99th percentile of the corpus"
             if limit is None:
-                limit, source = self._usual(plain), "99th percentile of the clips and the unpinned sample"
+                limit, source = self._own_limit(plain), "99th percentile of the clips and the unpinned sample"
             self.reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
             yield motion
 
     def lane(self) -> "Track":
-        """The pinned stretches for the page's timeline."""
+        """The pinned stretches as a lane of the page's timeline."""
         from a2g_jax.viz.player import Track
 
         spans = tuple((pin.start, pin.start + pin.motion.seconds, Path(pin.name).stem, "hold") for pin in self.pins)
         return Track("pinned", spans)
 
-    def _usual(self, plain: Motion) -> float:
+    def _own_limit(self, plain: Motion) -> float:
         motions = [plain, *(pin.motion for pin in self.pins if pin.motion.frames > 3)]
         values = [wrist_jerk(local_places(motion), motion.skeleton, motion.fps) for motion in motions]
         return float(np.percentile(np.concatenate(values), 99.0))

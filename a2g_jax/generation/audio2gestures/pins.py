@@ -21,23 +21,23 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.geometry.skeleton import Skeleton
 
-#: Shortest clip that is pinned, seconds: shorter ones drown in their transitions.
+#: Shortest clip that is pinned, seconds: shorter ones are lost in their transitions.
 SHORTEST = 0.2
-#: A second from 0 on, and maybe how many seconds of the clip.
+#: A file, a second from 0 on, and optionally the length in seconds.
 _FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 
 
 class Pin(NamedTuple):
-    """A clip and where it is wanted."""
+    """A clip and its place in time."""
 
     name: str
     """Its file, for messages."""
     start: float
-    """Seconds."""
+    """Seconds from the beginning of the speech."""
     motion: Motion
     """On the run's skeleton, at its frame rate."""
     turned: float = 0.0
-    """Degrees about the vertical by which it was turned to face as the run's motions do."""
+    """Degrees about the vertical by which it was turned to the facing direction of the run's motions."""
 
     @property
     def first(self) -> int:
@@ -46,15 +46,15 @@ class Pin(NamedTuple):
 
     @property
     def stop(self) -> int:
-        """Frame after its last."""
+        """Frame after the last one of the stretch."""
         return self.first + self.motion.frames
 
 
 def parse_pin(text: str) -> tuple[Path, float, float | None]:
-    """File, second and seconds of ``wave.bvh@3.2`` (the whole clip) or ``wave.bvh@3.2+1.5`` (its first 1.5 seconds).
+    """File, second and length of ``wave.bvh@3.2`` (the whole clip) or ``wave.bvh@3.2+1.5`` (its first 1.5 seconds).
 
     Raises:
-        InputError: of another form.
+        InputError: another form.
     """
     found = _FORM.fullmatch(text)
     if found is None:
@@ -71,18 +71,18 @@ def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray
 
     Args:
         text: as :func:`parse_pin` takes it.
-        facing: the root's usual rotation, by which the clip is turned as :func:`face` does.
+        facing: mean rotation of the run's root, to which :func:`face` turns the clip; not turned if None.
 
     Raises:
-        InputError: a file that cannot be read, a rig that is not understood, a clip shorter than a fifth of a second,
-            or one shorter than what is asked of it.
+        InputError: a file that cannot be read, a rig that is not recognised, a clip shorter than a fifth of a second,
+            or one shorter than the requested length.
     """
     path, start, length = parse_pin(text)
     motion = read_on_skeleton(path, skeleton, fps)
     if length is not None:
         frames = round(length * fps)
         if frames > motion.frames:
-            raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; ask for no more than that.")
+            raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; request no more than that.")
         motion = replace(motion, rotations=motion.rotations[:frames], root=motion.root[:frames])
     if motion.seconds < SHORTEST:
         raise InputError(f"--pin {text}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST} s or more.")
@@ -93,7 +93,7 @@ def read_pin(text: str, skeleton: Skeleton, fps: float, facing: Float[np.ndarray
 
 
 def check_pins(pins: Sequence[Pin], frames: int, fps: float) -> list[Pin]:
-    """The pins in their order in time.
+    """The pins in order of time.
 
     Raises:
         InputError: a pin that ends after the speech, or two that overlap.
@@ -115,7 +115,7 @@ def check_pins(pins: Sequence[Pin], frames: int, fps: float) -> list[Pin]:
 
 
 def pin_weights(frames: int, first: int, stop: int, blend: int) -> Float[np.ndarray, " frames"]:
-    """One from ``first`` to ``stop - 1``, falling to zero over ``blend`` frames on either side as a raised cosine."""
+    """Weights: one from ``first`` to ``stop - 1``, then a raised cosine to zero over ``blend`` frames."""
     frame = np.arange(frames)
     outside = np.maximum(np.maximum(first - frame, frame - (stop - 1)), 0)
     return 0.5 + 0.5 * np.cos(np.pi * np.minimum(outside / (blend + 1), 1.0))
@@ -126,19 +126,19 @@ def pin_codes(
 ) -> Codes:
     """The codes with those of the clips in their places.
 
-    Around a clip its first and last pose are held for the width of the blend, weaker and weaker.
+    Within the blend around a clip, its first and last pose are repeated with falling weight.
 
     Args:
-        pins: as :func:`check_pins` gives them.
-        blend: seconds on either side of a clip.
-        shared: from 0 to 1, how far the clip's own shared code replaces the audio's; the paper has 0.
+        pins: from :func:`check_pins`.
+        blend: seconds of blending on either side of a clip.
+        shared: share of a clip's own shared code that replaces the audio's, from 0 to 1; 0 in the paper.
     """
     total = len(codes.specific)
     places = [(codes.context + pin.first, codes.context + pin.stop) for pin in pins]
     weights = np.zeros((len(pins), total))
     for number, (pin, (first, stop)) in enumerate(zip(pins, places, strict=True)):
         weights[number] = pin_weights(total, first, stop, round(blend * pin.motion.fps))
-    # Where a clip stands, no neighbour's blend reaches in; between two close ones they share.
+    # Inside a clip its neighbours' blends have no weight; between two close clips the weights are normalised.
     for number, (first, stop) in enumerate(places):
         weights[np.arange(len(pins)) != number, first:stop] = 0.0
     weights /= np.maximum(weights.sum(axis=0), 1.0)
@@ -147,7 +147,7 @@ def pin_codes(
     mixed["shared"] = (1.0 - shared * (1.0 - left)) * codes.shared
     for pin, weight, (first, _) in zip(pins, weights, places, strict=True):
         own = space.from_motion(pin.motion)
-        # Row r of the speech's codes shows what row r - shift of the clip's does.
+        # Row r of the speech's codes corresponds to row r - (first - own.context) of the clip's.
         rows = np.clip(np.arange(total) - (first - own.context), 0, len(own.specific) - 1)
         share = jnp.asarray(weight, jnp.float32)[:, None]
         mixed["specific"] = mixed["specific"] + share * own.specific[rows]

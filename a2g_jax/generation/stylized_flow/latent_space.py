@@ -1,4 +1,4 @@
-"""The latents of a trained flow: of clips, and of new speech driven with them (Stylized flow, ECCV 2022, Sec. 4.5)."""
+"""Latents of a trained flow: those of clips, and generation with them (Stylized flow, ECCV 2022, Sec. 4.5)."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.engine import WINDOW
-from a2g_jax.generation.generator import Generator, speech_features, stand
+from a2g_jax.generation.generator import Generator, plant_rows, speech_features
 from a2g_jax.generation.stylized_flow.style import Style, drive
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
@@ -23,9 +23,9 @@ LogMel = Float[np.ndarray, "F bands"]
 
 
 class FlowSpace:
-    """A run of an invertible model, with access to its latents.
+    """The latents of a run of an invertible model.
 
-    Generating compiles once for all lengths of speech and of styles; encoding once for each number of windows.
+    Generation compiles once for all lengths of speech and of styles; encoding once for each number of windows.
     """
 
     def __init__(self, run: Run, window: int = WINDOW) -> None:
@@ -39,7 +39,7 @@ class FlowSpace:
         model = run.config.build()
         if model.encode is None or model.begin is None:
             raise InputError(
-                f"a run of {run.config.model} has no latents of frames for a style, and takes no seed poses; take a run"
+                f"a run of {run.config.model} has no latents of frames for a style, and takes no seed poses; use a run"
                 " of stylized_flow."
             )
         self.run, self._window = run, window
@@ -57,57 +57,57 @@ class FlowSpace:
     def encode(
         self, motion: Motion, audio: Float[np.ndarray, " N"] | None = None, name: str = "the clip"
     ) -> Float[np.ndarray, "T C"]:
-        """Latents of a clip, each given the clip's own speech and the clip's own poses before it.
+        """Latents of a clip's frames, each given the clip's own speech and the poses before it.
 
         Args:
-            motion: on any humanoid rig, at any rate; it is brought to the run's. Nothing turns it: see
+            motion: on any humanoid rig, at any rate; it is retargeted and resampled to the run's, not turned: see
                 :func:`a2g_jax.geometry.retarget.onto.face`.
-            audio: its speech, mono, at the run's sample rate. Without it silence takes its place, and what the speech
-                would have explained is in the latents too: the style is blunter.
+            audio: its speech, mono, at the run's sample rate; silence if None. The latents then also contain what the
+                speech would have explained, and the style is less specific.
             name: of the clip, for messages.
 
         Raises:
-            InputError: a rig that is not understood, a run without a skeleton, or audio of another length.
+            InputError: a rig that is not recognised, a run without a skeleton, or audio of another length.
         """
         config = self.run.config
         motion = on_skeleton(motion, config.skeleton, config.fps, name)
         frames, features = motion.frames, None
         if audio is not None:
-            spoken, moved = len(audio) / config.mel.sample_rate, motion.seconds
+            sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
             # The same tolerance as in the preparation of corpora.
-            if abs(spoken - moved) > max(1.0, 0.05 * max(spoken, moved)):
+            if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
                 raise InputError(
-                    f"{name}: its audio lasts {spoken:.2f} s and its motion {moved:.2f} s; cut them to the same take."
+                    f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
                 )
-            frames = min(frames, round(spoken * config.fps))
+            frames = min(frames, round(sound * config.fps))
             features = log_mel(audio, config.mel, config.fps, frames)
         return self.encode_rows(represent(motion, config.space.kind, name)[0][:frames], features)
 
     def encode_rows(
         self, rows: Rows, features: LogMel | None = None, before: Earlier | None = None
     ) -> Float[np.ndarray, "T C"]:
-        """:meth:`encode` for poses in the run's pose space, all frames at once.
+        """Latents of poses in the run's pose space: see :meth:`encode`.
 
         Args:
             features: log-mel rows of the frames, not normalised; silence if None.
-            before: the ``history`` poses before the first; the first pose, held, if None. With the mean pose of
-                generation there the first latents would encode a leap out of it, which is no part of the style.
+            before: the ``history`` poses before the first; the first pose repeated if None. With the mean pose of
+                generation, the first latents would encode a jump from it, which is not part of the style.
 
         Raises:
-            InputError: no frames, or other numbers of rows than the run and the poses have.
+            InputError: no frames, too few poses before them, or another number of audio rows.
         """
         frames = len(rows)
         if features is None:
             features = np.full((frames, self.run.config.mel.width), self._silence(), np.float32)
         if frames == 0 or len(features) != frames:
             raise InputError(f"a clip has {frames} poses and {len(features)} rows of audio; expected as many, above 0.")
-        # Frames behind the clip have no part in its own latents, and one size for many lengths compiles once.
+        # Frames after the clip do not affect its latents, and one size for many lengths compiles once.
         after = -frames % self._window + self._lookahead
         earlier = np.repeat(rows[:1], self.history, axis=0) if before is None else self._last(before)
         poses = np.concatenate([earlier, rows, np.repeat(rows[-1:], after, axis=0)])
         padded = np.pad(features, ((self.history, after), (0, 0)), constant_values=float(features.min()))
         audio = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
-        # Style controls are averages over seconds: of the clip alone, not of the poses held around it.
+        # Style controls are averages over seconds: of the clip only, not of the padding around it.
         controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0]
         controls = np.pad(controls, ((self.history, after), (0, 0)), mode="edge")
         return np.asarray(self._encode(self._params, audio, np.asarray(poses, np.float32), controls))[:frames]
@@ -127,12 +127,12 @@ class FlowSpace:
 
         Args:
             audio: mono, at the run's sample rate.
-            style: whose latents are mixed with the drawn ones.
+            style: its latents are mixed with the drawn ones.
             seed_poses: a motion that the samples continue: the poses before their first frame are its last ones, on
                 any humanoid rig and at any rate; the mean pose if None.
 
         Raises:
-            InputError: audio shorter than a frame, too few poses, or a style of another run.
+            InputError: audio shorter than a frame, too few seed poses, or a style of another run.
         """
         return list(self.stream(audio, samples, seed, style, seed_poses))
 
@@ -144,7 +144,7 @@ class FlowSpace:
         style: Style | None = None,
         seed_poses: Motion | None = None,
     ) -> Iterator[Motion]:
-        """:meth:`generate`, one motion after another."""
+        """Yield the motions of :meth:`generate` one after another."""
         config = self.run.config
         skeleton = config.skeleton
         earlier = None
@@ -152,7 +152,7 @@ class FlowSpace:
             moved = on_skeleton(seed_poses, skeleton, config.fps, "the seed clip")
             earlier = represent(moved, config.space.kind, "the seed clip")[0]
         for rows in self.rows(speech_features(self.run, audio), samples, seed, style, earlier):
-            yield stand(self.run, rows)
+            yield plant_rows(self.run, rows)
 
     def rows(
         self,
@@ -162,18 +162,18 @@ class FlowSpace:
         style: Style | None = None,
         seed_rows: Earlier | None = None,
     ) -> Iterator[Rows]:
-        """:meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
+        """Yield the rows of :meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
         earlier = None if seed_rows is None else self._last(seed_rows)
         latents = drive(style, len(features), self.channels)
         yield from self.generator.rows(features, samples, seed, seed_poses=earlier, latents=latents)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
-        """The last poses, as many as the conditioning of a frame has."""
+        """The last poses, as many as are in the conditioning of a frame."""
         if len(rows) < self.history:
             raise InputError(f"the seed poses are {len(rows)} frames; the run needs {self.history} or more.")
         return rows[-self.history :]
 
     def _silence(self) -> float:
-        """About the floor of the training recordings' features: a deviation below the mean of the quietest band."""
+        """About the floor of the training features: a standard deviation below the mean of the quietest band."""
         audio = self.run.config.statistics["audio"]
         return float(np.min(np.asarray(audio.mean) - np.asarray(audio.std)))

@@ -1,4 +1,4 @@
-"""Samples in the style of clips and with the seed poses of clips, from their files."""
+"""Samples in the style or with the seed poses of clips from files."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,55 +16,55 @@ from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.io.audio import read_audio
 from a2g_jax.training.run import Run
 
-#: Shortest clip that a style is taken from, seconds: shorter ones hold a pose or two, and no style.
+#: Shortest clip that a style is taken from, seconds: shorter ones have a pose or two, and no style.
 SHORTEST = 1.0
 
 
 @dataclass(frozen=True)
 class Clip:
-    """A motion file, and maybe its speech."""
+    """A motion file, optionally with its speech."""
 
     flag: str
-    """Which named it, for messages."""
+    """The option that named it, for messages."""
     path: Path
     audio: Path | None = None
 
 
 @dataclass(frozen=True)
 class Styling:
-    """What is asked for."""
+    """Options of styled generation."""
 
     style: Clip | None = None
     second: Clip | None = None
     """Blended with the first."""
     seed_clip: Clip | None = None
-    """Gone on from."""
+    """Motion whose last poses are the seed poses of the samples."""
     share: float = 0.9
-    """Of style beside chance."""
+    """Share of the style; the rest is drawn."""
     mode: str = "repeat"
     """See :mod:`a2g_jax.generation.stylized_flow.style`."""
     mix: float = 0.5
-    """Of the second clip."""
+    """Share of the second clip in the blend."""
 
     @property
     def label(self) -> str:
-        """For a page's heading."""
+        """Description for a page's heading."""
         words = []
         if self.style is not None:
             other = "" if self.second is None else f" and {self.second.path.name} ({self.mix:g})"
             words.append(f"style of {self.style.path.name}{other}, share {self.share:g}, {self.mode}")
         if self.seed_clip is not None:
-            words.append(f"going on from {self.seed_clip.path.name}")
+            words.append(f"continuing {self.seed_clip.path.name}")
         return ", ".join(words)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know."""
+        """Warnings for the user."""
         silent = [clip for clip in (self.style, self.second) if clip is not None and clip.audio is None]
-        return tuple(f"{clip.path}: encoded with silence: no {clip.flag}-audio names its speech" for clip in silent)
+        return tuple(f"{clip.path}: encoded with silence; give its speech with {clip.flag}-audio" for clip in silent)
 
     def place(self, run: Run, samples: int) -> "Styled":
-        """The clips as a run sees them.
+        """The clips, encoded with a run.
 
         Raises:
             InputError: a run of another model, a clip that cannot be used, or samples that would all be the same.
@@ -72,8 +72,8 @@ class Styling:
         space = FlowSpace(run)
         if self.style is not None and self.share == 1.0 and self.mode == "repeat" and samples > 1:
             raise InputError(
-                "--style-share 1: leaves nothing to chance, so that all samples would be the same; ask for --samples 1,"
-                " a smaller share, or --style-mode statistics."
+                "--style-share 1: draws nothing, so that all samples would be equal; use --samples 1, a smaller share,"
+                " or --style-mode statistics."
             )
         style = seed = None
         if self.style is not None:
@@ -101,24 +101,24 @@ class Styling:
 
 @dataclass(frozen=True, eq=False)
 class Styled:
-    """Clips in the latent space, ready for samples."""
+    """A sampler with a style and seed poses."""
 
     space: FlowSpace
     style: Style | None
     seed_poses: Motion | None
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
-        """Samples, one after another."""
+        """Yield samples one after another."""
         yield from self.space.stream(audio, samples, seed, self.style, self.seed_poses)
 
 
 def read_facing(clip: Clip, run: Run) -> Motion:
-    """A clip on the run's skeleton, at its rate, turned about the vertical to face as the run's motions do.
+    """A clip on the run's skeleton, at its rate, turned about the vertical to the facing direction of the run.
 
     Raises:
-        InputError: a file that cannot be read, a rig that is not understood, or a run without a skeleton.
+        InputError: a file that cannot be read, a rig that is not recognised, or a run without a skeleton.
     """
     config = run.config
     motion = read_on_skeleton(clip.path, config.skeleton, config.fps)
-    usual = config.space.mean_rotations(config.statistics["pose"].mean)
-    return face(motion, np.asarray(usual[0], np.float64))[0]
+    facing = config.space.mean_rotations(config.statistics["pose"].mean)
+    return face(motion, np.asarray(facing[0], np.float64))[0]

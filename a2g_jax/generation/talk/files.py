@@ -47,7 +47,7 @@ def deliver_talk(
 
     - ``speech.wav``: 16 bits, at the recording's rate. ``speech.TextGrid``: words, syllables, phones and more.
     - ``speech.json``: ``plan`` (all that the audio determines, as :class:`~a2g_jax.talker.speech.SpeechPlan`),
-      and how it was made.
+      and the recipe.
     - ``motion_00.bvh``, ``motion_00.npz``, ...: motion 0 is the recording's own, the others are draws.
     - ``truth_00.json``, ...: ``key`` of the draw (null for the recording's own), ``style`` (as
       :class:`~a2g_jax.talker.styles.GestureStyle`) and ``gestures``: strokes, phases of both hands, units, rest
@@ -79,8 +79,8 @@ def deliver_talk(
     if "json" in formats:
         write_json(files.folder / "speech.json", {**_made(recording, request), "plan": asdict(plan)})
     shown = []
-    for number, (body, truth) in enumerate(right_motions(recording, samples, request.seed)):
-        motion = request.seen(body)
+    for number, (whole, truth) in enumerate(right_motions(recording, samples, request.seed)):
+        motion = request.in_view(whole)
         files.write(number, motion)
         if "json" in formats:
             write_json(files.folder / f"truth_{number:02d}.json", _truth(recording, motion, truth, number, request))

@@ -1,4 +1,4 @@
-"""The page of the generated corpus itself: what is said, and motions that are right for it, with their truth."""
+"""The page of a generated recording: its speech, and motions that are right for it, with their truth."""
 
 import os
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ def write_talk_page(
 ) -> None:
     """Write one HTML file that plays the motions beside each other over the recording's speech.
 
-    Under the waveform stand words, syllables as high as their accent, and the pitch; then for each motion the phases of
+    Under the waveform are words, syllables as high as their accent, and the pitch; then for each motion the phases of
     both hands with the apexes of the strokes.
 
     Args:
@@ -28,7 +28,7 @@ def write_talk_page(
         motions: at least one, each with its truth.
 
     Raises:
-        InputError: as :func:`~a2g_jax.viz.player.write_page` says.
+        InputError: see :func:`~a2g_jax.viz.player.write_page`.
     """
     plan = plan_from_json(recording.annotations["speech"])
     write_page(
@@ -60,7 +60,7 @@ def speech_lanes(recording: Recording, plan: SpeechPlan) -> tuple[Bars | Curve, 
 
 
 def motion_figure(motion: Motion, truth: GestureTruth, plan: SpeechPlan, number: int) -> Figure:
-    """A motion with what is known about it."""
+    """A motion with a summary of its truth, as a figure of the page."""
     note = f"rest {truth.rest_pose}, {len(truth.units)} units, log p {truth.log_probability:.1f}"
     return Figure(motion, f"motion {number}", note, (gesture_lane(truth, plan),))
 
@@ -85,7 +85,7 @@ def gesture_lane(truth: GestureTruth, plan: SpeechPlan) -> Hands:
 def busiest_moments(truths: Sequence[GestureTruth], count: int, apart: float) -> list[float]:
     """Times of ``count`` strokes, ``apart`` seconds or more from each other, the largest first (seconds, in order).
 
-    Strokes belong to the same syllables in every motion of a recording, so the first truth's stand for all.
+    Strokes belong to the same syllables in every motion of a recording, so those of the first truth are used.
     """
     chosen: list[float] = []
     for stroke in sorted(truths[0].strokes, key=lambda one: (-one.size, one.apex)):

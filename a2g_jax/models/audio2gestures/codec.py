@@ -1,4 +1,4 @@
-"""Between poses, codes and positions: the four networks with the pose representation and the body around them."""
+"""The four networks of Audio2Gestures with the pose space around them: poses, codes and positions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from a2g_jax.models.base import Data, Params
 class Codec:
     """The four networks with the pose space around them.
 
-    Codes are in time, or in the DCT bands of consecutive blocks where the latent space is that of the DCT; decoding
-    takes them in time: :meth:`to_time`.
+    Codes are in time, or with the DCT latent space in the bands of consecutive blocks; decoding takes them in time:
+    see :meth:`to_time`.
     """
 
     config: Audio2GesturesConfig
@@ -28,7 +28,7 @@ class Codec:
 
     @property
     def width(self) -> int:
-        """Values of a pose."""
+        """Number of values of a pose."""
         rows, values = self.data.pose_statistics.mean.shape
         return rows * values
 
@@ -53,17 +53,19 @@ class Codec:
             params["mapping_net"] = mapping.init(keys[3], code)["params"]
         return params
 
-    def encode_audio(self, params: Params, audio: Float[Array, "B T bands"], dropout_key=None) -> Gaussian:
-        """S_A."""
+    def encode_audio(
+        self, params: Params, audio: Float[Array, "B T bands"], dropout_key: Key[Array, ""] | None = None
+    ) -> Gaussian:
+        """The shared code of audio, S_A."""
         code: Gaussian = self._by_clip(
             lambda clips: _apply(self.modules[0], params["audio_encoder"], dropout_key, clips), audio
         )
         return code
 
     def encode_motion(
-        self, params: Params, pose: Float[Array, "B T R D"], dropout_key=None
+        self, params: Params, pose: Float[Array, "B T R D"], dropout_key: Key[Array, ""] | None = None
     ) -> tuple[Gaussian, Gaussian | None]:
-        """S_M and I_M; the latter is None where the code is not split."""
+        """The shared and the motion-specific code of motion, S_M and I_M; the latter is None without a split."""
         values = self.data.pose_statistics.normalise(pose) if self.normalises else pose
         codes: tuple[Gaussian, Gaussian | None] = self._by_clip(
             lambda clips: _apply(self.modules[1], params["motion_encoder"], dropout_key, clips),
@@ -76,28 +78,28 @@ class Codec:
         params: Params,
         shared: Float[Array, "B T C"],
         specific: Float[Array, "B T C"] | None,
-        dropout_key=None,
+        dropout_key: Key[Array, ""] | None = None,
     ) -> Float[Array, "B T R D"]:
-        """Motion of a full code in time: 6D vectors that Gram-Schmidt makes rotations, or values as they are.
+        """Poses of a full code in time: 6D vectors before Gram-Schmidt, or the values of another kind of pose.
 
-        Exponential maps are not wrapped: those of a corpus are at most pi long, and speech turns no joint so far.
+        Exponential maps are not wrapped: those of a corpus are at most pi long, and no joint turns that far in speech.
         """
         flat = _apply(self.modules[2], params["decoder"], dropout_key, shared, specific)
         pose = flat.reshape(*flat.shape[:2], *self.data.pose_statistics.mean.shape)
         return self.data.pose_statistics.denormalise(pose) if self.normalises else pose
 
     def map_noise(self, params: Params, noise: Float[Array, "B T C"]) -> Gaussian:
-        """I_R, from noise in time."""
+        """The random specific code I_R, mapped from noise in time."""
         mapping: Any = self.modules[3].apply({"params": params["mapping_net"]}, noise)
         return mapping
 
     def to_time(self, code: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
-        """A code as the decoder takes it."""
+        """A code in time, as the decoder takes it."""
         return block_idct(code, self.config.dct_points) if self.config.latent == "dct" else code
 
     @property
     def normalises(self) -> bool:
-        """Whether networks take z-scores: by the settings, and always where poses are not of unit scale."""
+        """Whether networks take z-scores: if the settings say so, and always for poses that are not of unit scale."""
         return self.config.normalise_pose or not self.data.space.unit_scale
 
     def positions(
@@ -105,8 +107,8 @@ class Codec:
     ) -> tuple[Float[Array, "B T R 3 3"] | None, Float[Array, "B T R _"]]:
         """Rotations, and joint positions in metres with the root at the origin.
 
-        Where poses are no rotations (2D keypoints, bone directions): None, and the values as z-scores, which have no
-        unit and are near 1 whatever the camera or the speaker.
+        For poses without rotations (2D keypoints, bone directions): None, and the values as z-scores, which have no
+        unit and are of order 1 for any camera and speaker.
         """
         rotations = self.data.space.rotations(pose)
         if rotations is None:
@@ -116,21 +118,21 @@ class Codec:
     def valid(
         self, pose: Float[Array, "B T R D"], rotations: Float[Array, "B T R 3 3"] | None
     ) -> Float[Array, "B T R D"]:
-        """The pose that the rotations stand for, instead of the raw output; values without rotations as they are."""
+        """The pose written from its rotations, in place of the raw output; the pose itself without rotations."""
         return pose if rotations is None else self.data.space.valid(pose, rotations)
 
     def _by_clip(self, encode: Callable[[Array], Any], x: Float[Array, "B T C"]) -> Any:
-        """The codes of each block encoded on its own, as in training, where blocks are transformed (Sec. 6.3)."""
+        """Codes of clips; for the DCT latent space each block is encoded on its own, as in training (Sec. 6.3)."""
         points, (clips, frames) = self.config.dct_points, x.shape[:2]
         if self.config.latent != "dct" or frames == points:
             return encode(x)
         if frames % points:
-            raise ValueError(f"expected a multiple of {points} frames, which the DCT takes together; got {frames}")
+            raise ValueError(f"expected a multiple of {points} frames, the length of a DCT block; got {frames}")
         codes = encode(x.reshape(clips * frames // points, points, x.shape[-1]))
         return jax.tree.map(lambda code: code.reshape(clips, frames, -1), codes)
 
 
 def _apply(module: nn.Module, params: Params, dropout_key: Key[Array, ""] | None, *inputs: Array | None) -> Any:
-    """A network's output; dropout acts only when given a key."""
+    """Output of a network; with dropout only if a key is given."""
     rngs = None if dropout_key is None else {"dropout": dropout_key}
     return module.apply({"params": params}, *inputs, deterministic=dropout_key is None, rngs=rngs)

@@ -8,7 +8,7 @@ from a2g_jax.nn.blocks import BLOCK
 
 @dataclass(frozen=True)
 class Audio2GesturesConfig:
-    """Networks and losses; the defaults are the papers' (extended paper, Sec. 5.3; their code where silent)."""
+    """Networks and losses; defaults are the papers' (extended paper, Sec. 5.3; the authors' code where silent)."""
 
     audio_channels: tuple[int, ...] = (128, 128, 96, 96, 64)
     """Residual blocks of the audio encoder."""
@@ -23,30 +23,30 @@ class Audio2GesturesConfig:
     """Width of the shared and of the motion-specific code."""
     dropout: float = 0.0
     backbone: str = "tcn"
-    """Of both encoders: ``tcn``, ``gru`` or ``transformer`` (Sec. 6.2.4); the decoder is always a TCN."""
+    """Layers of both encoders: ``tcn``, ``gru`` or ``transformer`` (Sec. 6.2.4); the decoder is always a TCN."""
     recurrent_layers: int = 5
     """Bidirectional layers of the GRU backbone."""
     recurrent_channels: int = 32
-    """Of a GRU layer, each direction."""
+    """Width of a GRU layer, each direction."""
     attention_layers: int = 5
-    """Of the Transformer backbone."""
+    """Layers of the Transformer backbone."""
     attention_channels: int = 16
-    """Of query, key, value and everything between layers of the Transformer."""
+    """Width of query, key and value, and of the Transformer's layers."""
     attention_hidden: int = 256
-    """Of the two linear layers behind each attention."""
+    """Hidden width of the two linear layers after each attention."""
     attention_window: int = 32
-    """Frames that a Transformer layer's attention reaches over, half of them before and half after."""
+    """Frames in the attention window of a Transformer layer, half of them before and half after."""
     split: bool = True
-    """Whether there is a motion-specific code; without one audio and motion share all there is (Table 2, baseline)."""
+    """Whether there is a motion-specific code; without one all codes are shared (Table 2, baseline)."""
     mapping: bool = True
     """Whether noise with the statistics of I_M goes through the mapping net; otherwise I_R is standard normal noise."""
     latent: str = "time"
-    """``dct``: heads see the discrete cosine transform of the encoders' features (Sec. 6.3), and the shared code has no
-    variance."""
+    """``time``, or ``dct``: heads take the discrete cosine transform of the encoders' features (Sec. 6.3), and the
+    shared code has no variance."""
     dct_points: int = 128
-    """Frames that are encoded and transformed together; training clips are a multiple of them."""
+    """Frames of a DCT block; training clips are a multiple of it."""
     normalise_pose: bool = False
-    """Whether networks see and predict 6D rotations as z-scores of the training split; the papers use them raw."""
+    """Whether networks take and predict 6D rotations as z-scores of the training split; the papers use them raw."""
 
     clip_frames: int = 128
     """Frames in a training crop."""
@@ -58,31 +58,32 @@ class Audio2GesturesConfig:
     alignment_ramp_steps: int = 0
     """Steps over which the alignment weight rises linearly from zero; 0 for none.
 
-    At Xavier's weights the two shared codes lie far apart, and the quickest way together is to become constant.
+    At the initial (Xavier) weights the two shared codes are far apart, and the fastest way to align them is to make
+    both constant.
     """
     kl_shared_weight: float = 1e-3
-    """Of the KL divergence of the shared codes S_A and S_M."""
+    """Weight of the KL divergence of the shared codes S_A and S_M."""
     kl_specific_weight: float = 1e-3
-    """Of the KL divergence of the motion-specific codes I_M and I_R."""
+    """Weight of the KL divergence of the motion-specific codes I_M and I_R."""
     kl_ramp_steps: int = 100_000
     """Steps over which the KL weights rise linearly from zero; 0 for none."""
     relaxed_weight: float = 1.0
     relaxed_threshold: float = 0.002
     """Rho of the relaxed motion loss (Eq. 19), metres: 0.2 cm in the extended paper, 2 cm in the first."""
     sampled_rotation_weight: float = 0.0
-    """Of the rotation loss on motions with a random specific code; the authors' code has 1, the papers no such loss."""
+    """Weight of the rotation loss on motions with a random specific code; 1 in the authors' code, not in the papers."""
     sampled_speed_weight: float = 0.0
-    """Of the speed loss on motions with a random specific code; the authors' code has 5, the papers no such loss."""
+    """Weight of the speed loss on motions with a random specific code; 5 in the authors' code, not in the papers."""
     stft_weight: float = 0.0
-    """Of the distance of spectra over short windows (Eq. 6), beside the motion reconstruction losses."""
+    """Weight of the distance of spectra over short windows (Eq. 6), added to the motion reconstruction losses."""
     ssim_weight: float = 0.0
-    """Of one minus the structural similarity over time (Eq. 7)."""
+    """Weight of one minus the structural similarity over time (Eq. 7)."""
     lpips_weight: float = 0.0
-    """Of the perceptual distance in a feature network (Eq. 14), which ``a2g train --features RUN`` names."""
+    """Weight of the perceptual distance (Eq. 14) in the feature network of ``a2g train --features RUN``."""
     bicycle_weight: float = 0.1
     diversity_weight: float = 0.1
     diversity_decay_steps: int = 500_000
-    """Steps over which the diversity weight falls linearly to zero; 0 for never."""
+    """Steps over which the diversity weight falls linearly to zero; 0 for no decay."""
 
     def __post_init__(self) -> None:
         for name in ("audio_channels", "motion_channels", "decoder_channels"):
@@ -107,9 +108,9 @@ class Audio2GesturesConfig:
             raise InputError(f"--clip-frames: expected 2 or more, for speeds; got {self.clip_frames}.")
         if self.attention_window < 2 or self.attention_window % 2:
             raise InputError(f"--attention-window: expected an even number above 0; got {self.attention_window}.")
-        for name, known in (("backbone", ("tcn", "gru", "transformer")), ("latent", ("time", "dct"))):
-            if getattr(self, name) not in known:
-                raise InputError(f"--{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}.")
+        for name, choices in (("backbone", ("tcn", "gru", "transformer")), ("latent", ("time", "dct"))):
+            if getattr(self, name) not in choices:
+                raise InputError(f"--{name}: expected one of {', '.join(choices)}; got {getattr(self, name)!r}.")
         if self.latent == "dct" and self.clip_frames % self.dct_points:
             raise InputError(
                 f"--clip-frames: expected a multiple of --dct-points {self.dct_points}; got {self.clip_frames}."
@@ -133,9 +134,9 @@ PRESETS: dict[str, Audio2GesturesConfig] = {
         motion_channels=(64, 64, 64, 64, 64),
         decoder_channels=(64, 64, 64, 96, 96),
         normalise_pose=True,
-        # In metres the motion losses are hundredths. At the papers' weights the alignment and KL losses empty the
-        # shared code within the first hundreds of steps; a narrow specific code and the losses that the authors' code
-        # puts on sampled motions make the decoder need it.
+        # In metres the motion losses are hundredths. At the papers' weights the alignment and KL losses
+        # collapse the shared code within the first hundreds of steps; a narrow specific code, and the losses on sampled
+        # motions from the authors' code, make the decoder use it.
         kl_shared_weight=1e-6,
         kl_specific_weight=2e-4,
         kl_ramp_steps=1_000,

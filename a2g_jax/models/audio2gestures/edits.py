@@ -1,12 +1,12 @@
 """Edits of latent codes in bands of their discrete cosine transform (extended paper, Sec. 6.3), as a small language.
 
-An edit is a line such as ``specific keep 10``: the code (``shared`` or ``specific``), what is done, and to which bands.
+An edit is a line such as ``specific keep 10``: the code (``shared`` or ``specific``), an action, and bands.
 
-- ``keep N``: the lowest N bands stay, all others become zero; ``keep 0`` empties the code.
+- ``keep N``: the lowest N bands stay, all others become zero; ``keep 0`` clears the code.
 - ``zero A:B``: bands A to B - 1 become zero.
 - ``scale A:B FACTOR``: bands A to B - 1 are multiplied.
 - ``sample A:B NUMBER``: bands A to B - 1 are taken from an independent draw of that number.
-- ``swap A:B``: bands A to B - 1 are taken from another code, which only Python can give: :func:`apply_edits`.
+- ``swap A:B``: bands A to B - 1 are taken from another code; from Python only, see :func:`apply_edits`.
 
 A band is half a period in ``points`` frames: with 128 points at 30 frames a second, band k is at 0.117 k Hz. Band 0 is
 the code's mean over these frames.
@@ -25,7 +25,7 @@ CODES = ("shared", "specific")
 
 
 class Edit(NamedTuple):
-    """One edit."""
+    """An edit of the DCT bands of a code."""
 
     code: str
     """``"shared"`` or ``"specific"``."""
@@ -39,10 +39,10 @@ class Edit(NamedTuple):
 
 
 def parse_edit(text: str, points: int) -> Edit:
-    """An edit from its line.
+    """Parse the line of an edit.
 
     Raises:
-        InputError: anything else than the forms above, or bands beyond ``points``.
+        InputError: not of the forms above, or bands beyond ``points``.
     """
     words = text.split()
     if len(words) < 3 or words[0] not in CODES:
@@ -56,7 +56,9 @@ def parse_edit(text: str, points: int) -> Edit:
     if action not in ("zero", "scale", "sample", "swap"):
         raise _refused(text, "the actions are keep, zero, scale, sample and swap")
     if len(values) != (action in ("scale", "sample")):
-        raise _refused(text, f"'{action}' takes {'a number behind the bands' if not values else 'bands alone'}")
+        raise _refused(
+            text, f"'{action}' takes {'a number after the bands' if not values else 'no number after the bands'}"
+        )
     low, colon, high = bands.partition(":")
     if not colon:
         raise _refused(text, "bands are written first:stop, such as 0:10")
@@ -68,7 +70,7 @@ def parse_edit(text: str, points: int) -> Edit:
     try:
         value = float(values[0]) if values else 0.0
     except ValueError:
-        raise _refused(text, f"{values[0]!r} is no number") from None
+        raise _refused(text, f"{values[0]!r} is not a number") from None
     if not abs(value) < float("inf"):
         raise _refused(text, "the factor must be finite")
     return Edit(code, action, first, stop, value)
@@ -80,7 +82,7 @@ def apply_edits(
     points: int,
     other: Callable[[Edit], Float[Array, "*batch T C"]] | None = None,
 ) -> Float[Array, "*batch T C"]:
-    """A code in time with its bands edited, one edit after another.
+    """A code in time with its bands edited, in the order of the edits.
 
     Args:
         edits: of this code.
@@ -109,7 +111,7 @@ def apply_edits(
 
 def _whole(text: str, where: str) -> int:
     if not text.isdecimal():
-        raise _refused(where, f"{text!r} is no whole number")
+        raise _refused(where, f"{text!r} is not a whole number")
     return int(text)
 
 

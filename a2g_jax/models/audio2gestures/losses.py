@@ -47,8 +47,8 @@ def relaxed_loss(
 def bicycle_loss(code: Float[Array, "B T C"], recovered: Float[Array, "B T C"]) -> Float[Array, ""]:
     """L1 distance between a random specific code and the one encoded from its motion (Eq. 20).
 
-    The model gives the code itself without its gradient and the mean of the encoded one: a target that could move
-    towards its estimate would shrink to a constant. The paper does not say.
+    The model passes the code without its gradient and the mean of the encoded one: a target with a gradient would
+    shrink to a constant. The paper does not specify this.
     """
     return jnp.mean(jnp.abs(code - recovered))
 

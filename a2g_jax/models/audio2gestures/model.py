@@ -16,7 +16,7 @@ from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, 
 from a2g_jax.nn.noise import blended_draws, frame_normal, slow_normal
 from a2g_jax.nn.tcn import receptive_halo
 
-#: Frames on either side that a GRU is given to settle in; it has no end of its memory, but forgets.
+#: Frames of context on either side for a GRU, whose memory is unbounded but fades.
 RECURRENT_REACH = 256
 
 Code = Float[Array, "1 T C"]
@@ -26,10 +26,10 @@ _PAPER = Audio2GesturesSampling()
 
 
 def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSampling = _PAPER) -> Model:
-    """Audio2Gestures for a body and an audio feature; see :class:`a2g_jax.models.base.Model` for its parts.
+    """Audio2Gestures for a corpus's poses and audio features; see :class:`a2g_jax.models.base.Model` for its parts.
 
     Raises:
-        InputError: clips too short for a loss, or sampling settings that this latent space does not have.
+        InputError: clips too short for a loss, or sampling settings that do not apply to this latent space.
     """
     codec = Codec(config, data)
     check_objective(config)
@@ -52,18 +52,18 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
     def condition(params: Params, summary: Summary, given: Condition) -> Gaussian:
-        """S_A of one audio."""
+        """The shared code S_A of an audio."""
         del summary
         return codec.encode_audio(params, given.audio[None])
 
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], shared: Gaussian, start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
-        """g(S_A, I_R), given what :func:`condition` returned."""
+        """The motion g(S_A, I_R) for the output of :func:`condition`."""
         return codec.decode(params, *draw_codes(codec, sampling, params, summary, key, shared, start))[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
-        """g(S_M, I_M) with mean codes."""
+        """The motion g(S_M, I_M) of mean codes."""
         shared, specific = codec.encode_motion(params, batch.pose)
         time = codec.to_time
         return codec.decode(params, time(shared.mean), None if specific is None else time(specific.mean))
@@ -84,16 +84,16 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
 
 
 def check_sampling(config: Audio2GesturesConfig, sampling: Audio2GesturesSampling) -> None:
-    """Refuse settings of generation that a latent space does not have.
+    """Refuse sampling settings that do not apply to a latent space.
 
     Raises:
-        InputError: slow noise for DCT bands, or an edit that is none, or that needs another code.
+        InputError: slow noise for DCT bands, an invalid edit, or one that needs another code.
     """
     if config.latent == "dct" and sampling.noise_frames > 1:
         raise InputError("--noise-frames: bands of the DCT have no order in time; use 1 with a DCT latent space.")
     for edit in sampling.all_edits:
         if parse_edit(edit, config.dct_points).action == "swap":
-            raise InputError(f"--edit {edit!r}: takes bands from another code, which only Python can give.")
+            raise InputError(f"--edit {edit!r}: takes bands from another code; this is possible from Python only.")
 
 
 def draw_codes(
@@ -105,11 +105,11 @@ def draw_codes(
     shared: Gaussian,
     start: Int[Array, ""],
 ) -> tuple[Code, Code | None]:
-    """S_A and I_R in time, edited: what generation decodes.
+    """The codes S_A and I_R that generation decodes: drawn, in time, edited.
 
     Args:
         sampling: settings of the draw and of the edits.
-        shared: what ``condition`` returned.
+        shared: output of ``condition``.
         start: first frame of the window in the whole audio, a multiple of 128.
     """
     config = codec.config
@@ -118,7 +118,7 @@ def draw_codes(
 
     def edited(place: int, name: str) -> Code:
         def other(edit: Edit) -> Code:
-            # A sample of another number than any that --samples makes.
+            # A sample number that --samples does not reach.
             again = jax.random.fold_in(key, 2**31 + int(edit.value))
             code: Code = _draw(codec, sampling, params, summary, again, shared, start)[place]
             return code
@@ -132,7 +132,7 @@ def draw_codes(
 
 
 def _draw(codec, sampling, params, summary, key, shared, start):
-    """Codes before any edit; I_R from the mapping net, or from the standard normal where there is none."""
+    """Codes before any edit; I_R from the mapping net, or standard normal without one."""
     config = codec.config
     frames, channels = shared.mean.shape[1:]
     which, noise_key, shared_key, code_key = jax.random.split(key, 4)
@@ -156,7 +156,7 @@ def _draw(codec, sampling, params, summary, key, shared, start):
 
 
 def _halo(config: Audio2GesturesConfig) -> int:
-    """Frames on either side that an output frame depends on; for the GRU, that it noticeably depends on."""
+    """Frames on either side that an output frame depends on; for the GRU, those with a noticeable effect."""
     if config.latent == "dct":
         reach = config.dct_points - 1
     elif config.backbone == "gru":
@@ -170,5 +170,5 @@ def _halo(config: Audio2GesturesConfig) -> int:
         mapping = config.dct_points - 1 + MAPPING_LAYERS * (config.kernel_size // 2)
     else:
         mapping = MAPPING_LAYERS * (config.kernel_size // 2)
-    # The decoder sees codes from an encoder or from the mapping net, whichever reaches farther.
+    # The decoder takes codes from an encoder or from the mapping net; the one that reaches farther counts.
     return max(reach, mapping) + receptive_halo(len(config.decoder_channels), config.kernel_size)

@@ -27,12 +27,12 @@ class Gaussian(NamedTuple):
         return self.shift(jax.random.normal(key, self.mean.shape, self.mean.dtype))
 
     def shift(self, noise: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
-        """The draw that standard normal ``noise`` stands for."""
+        """The draw for given standard normal ``noise``."""
         return self.mean + jnp.exp(0.5 * self.log_variance) * noise
 
     @classmethod
     def certain(cls, mean: Float[Array, "B T C"]) -> "Gaussian":
-        """No spread at all: an autoencoder's code."""
+        """A Gaussian of zero variance: the code of an autoencoder."""
         return cls(mean, jnp.full_like(mean, -jnp.inf))
 
 
@@ -63,7 +63,7 @@ class GaussianHead(nn.Module):
 
 
 class BandHead(nn.Module):
-    """One linear layer each for mean and log-variance of DCT bands; for the shared code a mean alone (Sec. 6.3)."""
+    """One linear layer each for mean and log-variance of DCT bands; for the shared code only the mean (Sec. 6.3)."""
 
     features: int
     points: int
@@ -79,7 +79,7 @@ class BandHead(nn.Module):
 
 
 class BidirectionalGRU(nn.Module):
-    """Layers of two GRUs each, one of which reads backwards; their outputs lie side by side."""
+    """Layers of a forward and a backward GRU each, with concatenated outputs."""
 
     layers: int
     features: int
@@ -93,7 +93,7 @@ class BidirectionalGRU(nn.Module):
 
 
 def _backbone(config: Audio2GesturesConfig, channels: Sequence[int]) -> Callable[..., Array]:
-    """An encoder's body."""
+    """The layers of an encoder before its heads."""
     if config.backbone == "gru":
         return BidirectionalGRU(config.recurrent_layers, config.recurrent_channels)
     if config.backbone == "transformer":
@@ -125,7 +125,7 @@ class AudioEncoder(nn.Module):
 
 
 class MotionEncoder(nn.Module):
-    """f_M: motion to the shared code S_M and the motion-specific code I_M (None where the code is not split)."""
+    """f_M: motion to the shared code S_M and the motion-specific code I_M (None without a split)."""
 
     config: Audio2GesturesConfig
 

@@ -1,4 +1,4 @@
-"""What Audio2Gestures is trained on: every loss of a batch, and their weights at a step."""
+"""The objective of Audio2Gestures: every loss of a batch, and the weights of a step."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,7 +19,7 @@ Terms = dict[str, Array]
 
 
 def check_objective(config: Audio2GesturesConfig) -> None:
-    """Refuse clips that a loss cannot be computed on.
+    """Refuse clips on which a loss cannot be computed.
 
     Raises:
         InputError: clips shorter than a window of the STFT.
@@ -32,7 +32,7 @@ def weights(config: Audio2GesturesConfig) -> Callable[[Int[Array, ""]], dict[str
     """Weight of each term as a function of the step."""
 
     def at(step: Int[Array, ""]) -> dict[str, Any]:
-        together = jnp.minimum(step / config.alignment_ramp_steps, 1.0) if config.alignment_ramp_steps else 1.0
+        alignment = jnp.minimum(step / config.alignment_ramp_steps, 1.0) if config.alignment_ramp_steps else 1.0
         ramp = jnp.minimum(step / config.kl_ramp_steps, 1.0) if config.kl_ramp_steps else 1.0
         decay = jnp.maximum(1.0 - step / config.diversity_decay_steps, 0.0) if config.diversity_decay_steps else 1.0
         return {
@@ -42,7 +42,7 @@ def weights(config: Audio2GesturesConfig) -> Callable[[Int[Array, ""]], dict[str
             "stft": config.stft_weight,
             "ssim": config.ssim_weight,
             "lpips": config.lpips_weight,
-            "alignment": config.alignment_weight * together,
+            "alignment": config.alignment_weight * alignment,
             "kl_shared": config.kl_shared_weight * ramp,
             "kl_specific": config.kl_specific_weight * ramp,
             "relaxed": config.relaxed_weight,
@@ -56,8 +56,8 @@ def weights(config: Audio2GesturesConfig) -> Callable[[Int[Array, ""]], dict[str
 
 
 def total(terms: Terms, weighted: dict[str, Any]) -> Float[Array, ""]:
-    """Weighted sum of the terms that are there."""
-    # XLA keeps a product with a constant zero, and the whole gradient behind it: leave those terms out.
+    """Weighted sum of the terms that were computed."""
+    # XLA keeps a product with a constant zero, and its whole gradient: leave those terms out.
     used = [
         name for name, weight in weighted.items() if name in terms and not (isinstance(weight, float) and weight == 0.0)
     ]
@@ -72,7 +72,7 @@ def code_noise(key: Key[Array, ""], code: Float[Array, "B T C"]) -> Float[Array,
 
 
 def terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
-    """Every loss of one batch, unweighted, and figures that show degeneration early."""
+    """Every loss of one batch, unweighted, and diagnostics that show a collapse early."""
     return (_split_terms if codec.config.split else _joint_terms)(codec, params, key, batch)
 
 
@@ -107,7 +107,7 @@ def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     target, rebuilt, transferred, sampled, other = jnp.split(places, 5)
     turns = None if rotations is None else jnp.split(rotations, 5)
 
-    # The re-encoded motion is a valid one: 6D of the rotation, not of the raw output.
+    # A valid pose is encoded again: 6D of the rotations, not the raw output.
     random_pose = codec.valid(pose[2 * clips : 3 * clips], None if turns is None else turns[3])
     recovered = codec.encode_motion(params, random_pose, drop[3])[1]
     assert recovered is not None
@@ -133,7 +133,7 @@ def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
 
 
 def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
-    """Without a motion-specific code: reconstruction and alignment alone (Table 2, baseline)."""
+    """Without a motion-specific code: only reconstruction and alignment (Table 2, baseline)."""
     config = codec.config
     keys = jax.random.split(key, 5)
     drop = list(keys[2:]) if config.dropout > 0 else [None] * 3
@@ -154,7 +154,7 @@ def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
 
 
 def _shared_kl(config: Audio2GesturesConfig, audio: Any, motion: Any) -> Terms:
-    """An autoencoder's shared code has no variance to hold against a prior."""
+    """KL divergence of the shared codes; no term for an autoencoder's, which have no variance."""
     return {} if config.latent == "dct" else {"kl_shared": losses.kl_loss(audio) + losses.kl_loss(motion)}
 
 
@@ -170,9 +170,9 @@ def _motion_terms(
 
     Args:
         pose: the raw outputs of both.
-        turns: rotations of the truth and of both, first; None where poses are no rotations.
+        turns: rotations, those of the truth and of both first; None for poses without rotations.
         target: positions of the truth.
-        made: of both.
+        made: positions of both.
     """
     config = codec.config
     both, twice = jnp.concatenate(made), jnp.concatenate([target, target])

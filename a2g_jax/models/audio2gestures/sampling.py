@@ -1,4 +1,4 @@
-"""Settings of generation with Audio2Gestures; they can change without touching a trained run."""
+"""Sampling settings of Audio2Gestures; they can change without retraining."""
 
 from dataclasses import dataclass, field
 
@@ -15,21 +15,21 @@ class Audio2GesturesSampling:
     """Frames between draws of the noise that enters the mapping net; 1 for independent frames, as in the papers and in
     training.
 
-    The decoder averages independent noise away; noise that changes every second makes samples differ more in the
-    following gestures, and calmer. Trained with, it makes them differ less.
+    The decoder averages independent noise away; noise that changes every second makes the gestures of samples differ
+    more, and calmer. Used in training, it makes them differ less.
     """
     redraw_frames: int = 0
     """Frames after which the motion-specific code's statistics are redrawn, with linear blending.
 
-    0 keeps one draw for the whole audio, as the authors do; then a hidden choice such as the hand tends to stay the
-    same throughout a long speech.
+    0 keeps one draw for the whole audio, as the authors do; then a latent choice such as the gesturing hand tends
+    to stay the same throughout a long speech.
     """
     sample_codes: bool = True
     """Whether codes are drawn from their posteriors, as the authors do; otherwise their means are used (smoother)."""
     keep_shared: int | None = None
-    """Lowest DCT bands of the shared code that are kept, before other edits; none for all."""
+    """Lowest DCT bands of the shared code that are kept, before other edits; all if not set."""
     keep_specific: int | None = None
-    """Lowest DCT bands of the specific code that are kept, before other edits; none for all."""
+    """Lowest DCT bands of the specific code that are kept, before other edits; all if not set."""
     edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
     """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5'; may be repeated."""
 
@@ -48,12 +48,12 @@ class Audio2GesturesSampling:
 
     @property
     def all_edits(self) -> tuple[str, ...]:
-        """The edits as lines of :mod:`a2g_jax.models.audio2gestures.edits`, bands that are kept first."""
+        """All edits as lines of :mod:`a2g_jax.models.audio2gestures.edits`, those of ``keep_*`` first."""
         kept = (("shared", self.keep_shared), ("specific", self.keep_specific))
         return (*(f"{name} keep {count}" for name, count in kept if count is not None), *self.edits)
 
 
-#: By preset; the papers' where a preset is not named.
+#: Sampling settings by preset; the papers' for presets that are missing.
 SAMPLING_PRESETS: dict[str, Audio2GesturesSampling] = {
     "tiny": Audio2GesturesSampling(redraw_frames=128, sample_codes=False),
 }

@@ -10,7 +10,7 @@ class EmotionClassifierConfig:
     """A convolutional network over time, an average over the clip, and a perceptron (EmotionGesture, Sec. 4)."""
 
     input: str = "motion"
-    """What it looks at: 'motion' or 'audio'."""
+    """Input of the classifier: 'motion' or 'audio'."""
     channels: tuple[int, ...] = (128, 128, 128, 128)
     """Residual blocks."""
     hidden: int = 128

@@ -18,7 +18,7 @@ from a2g_jax.nn.tcn import TCN, receptive_halo
 
 
 class ClipClassifier(nn.Module):
-    """Residual blocks over time; mean and spread over the clip; two linear layers."""
+    """Residual blocks over time; mean and standard deviation over the clip; two linear layers."""
 
     channels: Sequence[int]
     hidden: int
@@ -29,9 +29,9 @@ class ClipClassifier(nn.Module):
     @nn.compact
     def __call__(self, x: Float[Array, "B T C"], deterministic: bool = True) -> Float[Array, "B K"]:
         x = TCN(self.channels, self.kernel_size, self.dropout)(x, deterministic)
-        # The epsilon keeps the gradient of the root finite where a channel does not move.
-        spread = jnp.sqrt(jnp.var(x, axis=1) + 1e-6)
-        pooled = jnp.concatenate([jnp.mean(x, axis=1), spread], axis=-1)
+        # The epsilon keeps the gradient of the root finite where a channel is constant.
+        deviation = jnp.sqrt(jnp.var(x, axis=1) + 1e-6)
+        pooled = jnp.concatenate([jnp.mean(x, axis=1), deviation], axis=-1)
         hidden = nn.Dropout(self.dropout)(nn.relu(nn.Dense(self.hidden)(pooled)), deterministic=deterministic)
         logits: Float[Array, "B K"] = nn.Dense(self.classes)(hidden)
         return logits
@@ -40,7 +40,7 @@ class ClipClassifier(nn.Module):
 def classify(
     config: EmotionClassifierConfig, data: Data, params: Params, batch: Batch, dropout_key: Key[Array, ""] | None = None
 ) -> Float[Array, "B K"]:
-    """Logits over ``data.emotions`` for every clip; dropout acts only when given a key."""
+    """Logits over ``data.emotions`` for every clip; with dropout only if a key is given."""
     network = _network(config, data)
     if config.input == "audio":
         values = batch.audio
@@ -79,14 +79,14 @@ def build(config: EmotionClassifierConfig, data: Data, sampling: NoSampling = NO
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """Cross entropy; accuracy beside it."""
+        """Cross entropy, with the accuracy as a term."""
         del step
         return entropy(params, batch, key if config.dropout > 0 else None)
 
     def validation_loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """The same without dropout."""
+        """Cross entropy without dropout."""
         del key, step
         return entropy(params, batch, None)
 
@@ -95,11 +95,11 @@ def build(config: EmotionClassifierConfig, data: Data, sampling: NoSampling = NO
             raise ValueError("a batch for the emotion classifier needs emotions")
         logits = classify(config, data, params, batch, dropout_key)
         loss = jnp.mean(optax.softmax_cross_entropy_with_integer_labels(logits, batch.emotion))
-        right = jnp.mean((jnp.argmax(logits, axis=-1) == batch.emotion).astype(jnp.float32))
-        return loss, {"accuracy": right}
+        accuracy = jnp.mean((jnp.argmax(logits, axis=-1) == batch.emotion).astype(jnp.float32))
+        return loss, {"accuracy": accuracy}
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """The probability given to each clip's own emotion."""
+        """Predicted probability of each clip's own emotion."""
         del key
         probabilities = jax.nn.softmax(classify(config, data, params, batch))
         assert batch.emotion is not None

@@ -7,7 +7,7 @@ from a2g_jax.errors import InputError
 
 @dataclass(frozen=True)
 class MotionAutoencoderConfig:
-    """Networks and losses; five residual blocks see 125 frames, as the extended Audio2Gestures paper says (Sec. 4.1.3).
+    """Networks and losses; five residual blocks span 125 frames, as in the extended Audio2Gestures paper (Sec. 4.1.3).
 
     The paper gives the width of the fourth block's features (128) and nothing more; the other widths are ours.
     """
@@ -18,14 +18,14 @@ class MotionAutoencoderConfig:
     """Residual blocks of the decoder."""
     kernel_size: int = 3
     clip_frames: int = 128
-    """Frames in a training crop, and in a clip that is scored."""
+    """Frames in a training crop, and in an evaluated clip."""
     rotation_weight: float = 1.0
     position_weight: float = 1.0
     speed_weight: float = 5.0
     value_weight: float = 1.0
-    """Of the L1 distance of normalised values, where poses are not rotations."""
+    """Weight of the L1 distance of normalised values, where poses are not rotations."""
     noise: float = 0.0
-    """Standard deviation of noise on the normalised input, which must not come out again; 0 for none."""
+    """Standard deviation of noise on the normalised input, which is not part of the target; 0 for none."""
 
     def __post_init__(self) -> None:
         for name in ("encoder_channels", "decoder_channels"):

@@ -18,7 +18,7 @@ from a2g_jax.nn.tcn import TCN, ResidualBlock, receptive_halo
 
 
 class Encoder(nn.Module):
-    """Residual blocks, block i with dilation ``2 ** i``; gives the output of each."""
+    """Residual blocks, block i with dilation ``2 ** i``; returns the output of each."""
 
     channels: Sequence[int]
     kernel_size: int
@@ -68,7 +68,7 @@ def build(config: MotionAutoencoderConfig, data: Data, sampling: NoSampling = NO
         return {"encoder": encoder.init(keys[0], pose)["params"], "decoder": decoder.init(keys[1], code)["params"]}
 
     def rebuild(params: Params, values: Float[Array, "B T R D"]) -> Float[Array, "B T R D"]:
-        """Normalised poses through the bottleneck and back."""
+        """Normalised poses, encoded and decoded."""
         outputs: Any = encoder.apply({"params": params["encoder"]}, values.reshape(*values.shape[:2], -1))
         rebuilt: Any = decoder.apply({"params": params["decoder"]}, outputs[-1])
         return rebuilt.reshape(values.shape)
@@ -102,12 +102,12 @@ def build(config: MotionAutoencoderConfig, data: Data, sampling: NoSampling = NO
         return sum((weights[name] * terms[name] for name in terms), start=jnp.zeros(())), terms
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """Time-averaged features of the fourth block, of which a report can tell how far training reaches."""
+        """Time-averaged features of the fourth block, for reports on the range of the training data."""
         del key
         return {"features": jnp.mean(encode(config, data, params, batch.pose)[3], axis=1)}
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
-        """Through the bottleneck and back, without noise."""
+        """Poses encoded and decoded, without noise."""
         rebuilt = rebuild(params, data.pose_statistics.normalise(batch.pose))
         back: Float[Array, "B T R D"] = data.pose_statistics.denormalise(rebuilt)
         return back

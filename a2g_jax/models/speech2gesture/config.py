@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields
 
 from a2g_jax.errors import InputError
 
-#: Convolutions of the audio encoder: every second of the first six halves the bands, the last one takes all that is
-#: left of them.
+#: Convolutions of the audio encoder: every second of the first six halves the bands, the last one takes all
+#: bands that remain.
 AUDIO_LAYERS = 8
 
 
@@ -18,9 +18,9 @@ class Speech2GestureConfig:
     """
 
     audio_channels: tuple[int, ...] = (64, 64, 128, 128, 256, 256, 256, 256)
-    """Of the eight layers of the audio encoder."""
+    """Channels of the eight layers of the audio encoder."""
     channels: int = 256
-    """Of every layer of the U-Net."""
+    """Channels of every layer of the U-Net."""
     depth: int = 5
     """Halvings of time in the U-Net; it has ``2 + 2 * depth + decoder_layers`` layers, 16 in the paper."""
     decoder_layers: int = 4
@@ -28,22 +28,22 @@ class Speech2GestureConfig:
     normalise: bool = True
     """Whether a layer normalisation follows each convolution, in place of the authors' batch normalisation."""
     discriminator_channels: tuple[int, ...] = (64, 128, 256)
-    """Of the discriminator's layers before the score; all but the last halve time."""
+    """Channels of the discriminator's layers before its output; all but the last halve time."""
     clip_frames: int = 128
     """Frames in a training crop: 128 in 3D, 64 in 2D (at 15 fps)."""
 
     rotation_weight: float = 1.0
-    """Of the angle between rotations, where poses are rotations."""
+    """Weight of the angle between rotations, where poses are rotations."""
     position_weight: float = 1.0
-    """Of the L1 distance of joint positions, where poses are rotations."""
+    """Weight of the L1 distance of joint positions, where poses are rotations."""
     speed_weight: float = 5.0
-    """Of the L1 distance of joint velocities, where poses are rotations."""
+    """Weight of the L1 distance of joint velocities, where poses are rotations."""
     value_weight: float = 1.0
-    """Of the L1 distance of z-scores, where poses are keypoints or directions."""
+    """Weight of the L1 distance of z-scores, where poses are keypoints or directions."""
     value_speed_weight: float = 0.0
-    """Of the L1 distance of differences between frames' z-scores; the authors leave it out."""
+    """Weight of the L1 distance of differences between frames' z-scores; the authors leave it out."""
     adversarial_weight: float = 1.0
-    """Of the generator's adversarial loss; 0 trains without a discriminator ("S2G w/o GAN")."""
+    """Weight of the translation network's adversarial loss; 0 trains without a discriminator ("S2G w/o GAN")."""
 
     def __post_init__(self) -> None:
         if len(self.audio_channels) != AUDIO_LAYERS or min(self.audio_channels) < 1:

@@ -11,7 +11,7 @@ from a2g_jax.models import motion_losses as losses
 from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
 from a2g_jax.models.entry import NO_SAMPLING, NoSampling
 from a2g_jax.models.speech2gesture.config import Speech2GestureConfig
-from a2g_jax.models.speech2gesture.networks import Discriminator, Translator, generator_halo
+from a2g_jax.models.speech2gesture.networks import Discriminator, Translator, translator_halo
 
 
 def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SAMPLING) -> Model:
@@ -22,20 +22,20 @@ def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SA
     del sampling
     rows = data.pose_statistics.mean.shape
     width = rows[0] * rows[1]
-    generator = Translator(config, width)
+    translator = Translator(config, width)
     discriminator = Discriminator(config.discriminator_channels, config.normalise)
     adversarial = config.adversarial_weight > 0
 
     def init(key: Key[Array, ""]) -> Params:
-        """Without a discriminator where nothing is trained against it."""
+        """Initial parameters; without a discriminator if the adversarial weight is 0."""
         keys = jax.random.split(key)
-        params = {"generator": generator.init(keys[0], jnp.zeros((1, config.stride, data.audio_bands)))["params"]}
+        params = {"generator": translator.init(keys[0], jnp.zeros((1, config.stride, data.audio_bands)))["params"]}
         if adversarial:
             params["discriminator"] = discriminator.init(keys[1], jnp.zeros((1, config.stride, width)))["params"]
         return params
 
-    def generate(params: Params, audio: Float[Array, "B T bands"]) -> Float[Array, "B T R D"]:
-        values: Any = generator.apply({"params": params["generator"]}, audio)
+    def translate(params: Params, audio: Float[Array, "B T bands"]) -> Float[Array, "B T R D"]:
+        values: Any = translator.apply({"params": params["generator"]}, audio)
         pose: Float[Array, "B T R D"] = data.pose_statistics.denormalise(values.reshape(*values.shape[:2], *rows))
         return pose
 
@@ -44,31 +44,31 @@ def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SA
         values = data.pose_statistics.normalise(pose)
         return jnp.diff(values.reshape(*values.shape[:2], -1), axis=1)
 
-    def score(params: Params, moved: Float[Array, "B T D"]) -> Float[Array, "B _"]:
-        scores: Any = discriminator.apply({"params": params}, moved)
-        return scores
+    def judge(params: Params, moved: Float[Array, "B T D"]) -> Float[Array, "B _"]:
+        outputs: Any = discriminator.apply({"params": params}, moved)
+        return outputs
 
     def regression(params: Params, batch: Batch) -> tuple[Float[Array, "B T R D"], dict[str, Array], dict[str, float]]:
-        """The generated poses as the discriminator takes them, and the terms of the regression with their weights."""
-        pose = generate(params, batch.audio)
+        """The generated poses as the discriminator takes them, and the regression terms with their weights."""
+        pose = translate(params, batch.audio)
         rotations = data.space.rotations(jnp.stack([pose, batch.pose]))
         if rotations is None:
             return pose, *_value_terms(config, data, pose, batch.pose)
-        # The pose that the output stands for: the length of raw 6D vectors is nothing to judge.
+        # A valid pose: the discriminator must not judge the length of raw 6D vectors.
         return data.space.valid(pose, rotations[0]), *_rotation_terms(config, data, rotations)
 
-    def generator_loss(
+    def translator_loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """Regression, and with a discriminator the generator's side of a least-squares GAN."""
+        """Regression, and with a discriminator the translation network's side of a least-squares GAN."""
         del key, step
         made, terms, weights = regression(params, batch)
         if adversarial:
             terms["adversarial"] = jnp.mean(
-                jnp.square(score(jax.lax.stop_gradient(params["discriminator"]), motion(made)) - 1.0)
+                jnp.square(judge(jax.lax.stop_gradient(params["discriminator"]), motion(made)) - 1.0)
             )
             weights["adversarial"] = config.adversarial_weight
-        # XLA keeps a product with a constant zero, and the whole gradient behind it: leave those terms out.
+        # XLA keeps a product with a constant zero, and its whole gradient: leave those terms out.
         total = sum((weights[name] * terms[name] for name in terms if weights[name] > 0), start=jnp.zeros(()))
         return total, terms
 
@@ -79,43 +79,43 @@ def build(config: Speech2GestureConfig, data: Data, sampling: NoSampling = NO_SA
         del key, step
         made, _, _ = regression(params, batch)
         both = jnp.concatenate([motion(batch.pose), motion(jax.lax.stop_gradient(made))])
-        real_score, fake_score = jnp.split(score(params["discriminator"], both), 2)
-        loss = jnp.mean(jnp.square(real_score - 1.0)) + jnp.mean(jnp.square(fake_score))
+        real, fake = jnp.split(judge(params["discriminator"], both), 2)
+        loss = jnp.mean(jnp.square(real - 1.0)) + jnp.mean(jnp.square(fake))
         return loss, {"discriminator": loss}
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """Nothing: there is no latent space."""
+        """An empty summary: there is no latent space."""
         del params, key, batch
         return {}
 
     def condition(params: Params, summary: Summary, given: Condition) -> Float[Array, "T R D"]:
-        """The one motion of an audio."""
+        """The only motion of an audio."""
         del summary
-        return generate(params, given.audio[None])[0]
+        return translate(params, given.audio[None])[0]
 
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], condition: Float[Array, "T R D"], start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
-        """The one motion of an audio, whatever the key."""
+        """The only motion of an audio, for any key."""
         del params, summary, key, start
         return condition
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
-        """The motion of the batch's audio; its poses play no part."""
-        return generate(params, batch.audio)
+        """The motion of the batch's audio; its poses are not used."""
+        return translate(params, batch.audio)
 
-    # In turns, as the authors train, each with its own optimiser; theirs take another batch for the second turn.
-    updates: tuple[Update, ...] = (Update(generator_loss),)
+    # In turns, as the authors train, each with its own optimiser; theirs use another batch for the second turn.
+    updates: tuple[Update, ...] = (Update(translator_loss),)
     if adversarial:
         updates = (
             Update(discriminator_loss, ("discriminator",), "discriminator"),
-            Update(generator_loss, ("generator",), "generator"),
+            Update(translator_loss, ("generator",), "generator"),
         )
     return Model(
         "speech2gesture",
         config,
         config.clip_frames,
-        generator_halo(config),
+        translator_halo(config),
         init,
         (Stage(updates),),
         summarise,

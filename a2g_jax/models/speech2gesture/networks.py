@@ -3,12 +3,12 @@
 Ginosar et al., "Learning Individual Styles of Conversational Gesture", 2019, Sec. 4; widths and order of layers as in
 the authors' code. Three things differ:
 
-- Layer normalisation over what a frame holds replaces batch normalisation. It has no running state, and a frame's
+- Layer normalisation over the values of a frame replaces batch normalisation. It has no running state, and a frame's
   output depends on no frame beyond the receptive field, so that windows of a long audio agree with one pass.
-- The audio encoder thins out frequency alone. Theirs sees spectra at 100 Hz, halves them three times in time, and
-  resizes the rest to the frames of the motion; our features lie on those frames from the start.
-- Upsampling repeats frames, as theirs does, and clips whose length is no multiple of the stride are padded at the end
-  with zeros (the mean audio) and cut again; theirs are always 64 frames long.
+- The audio encoder subsamples frequency only. Theirs takes spectra at 100 Hz, halves them three times in time, and
+  resizes the result to the frames of the motion; our features are at those frames from the start.
+- Upsampling repeats frames, as theirs does, and clips whose length is not a multiple of the stride are padded at the
+  end with zeros (the mean audio) and trimmed afterwards; theirs are always 64 frames long.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ EPSILON = 1e-5
 
 
 class Activation(nn.Module):
-    """Layer normalisation of each frame, where wanted, and a leaky rectifier."""
+    """Optional layer normalisation of each frame, and a leaky rectifier."""
 
     normalise: bool
 
@@ -40,9 +40,9 @@ class Activation(nn.Module):
 
 
 class AudioEncoder(nn.Module):
-    """Eight convolutions over the image of time and frequency; the last one takes all bands that are left.
+    """Eight convolutions over the image of time and frequency; the last one takes all bands that remain.
 
-    Where several spectra share a frame, they lie one above the other in the image.
+    Where several spectra share a frame, they are stacked along frequency.
     """
 
     channels: Sequence[int]
@@ -50,7 +50,7 @@ class AudioEncoder(nn.Module):
 
     @nn.compact
     def __call__(self, audio: Float[Array, "B T bands"]) -> Float[Array, "B T C"]:
-        # Beside the audio a channel of ones: without one, normalising would hide how loud the audio is.
+        # With a channel of ones beside the audio: otherwise normalisation would remove the loudness.
         x = jnp.stack([audio, jnp.ones_like(audio)], axis=-1)
         for layer, features in enumerate(self.channels[:-1]):
             halved = layer % 2 == 1
@@ -60,7 +60,7 @@ class AudioEncoder(nn.Module):
 
 
 class UNet(nn.Module):
-    """Convolutions that halve time, and as many on the way back, each with what the same rate held before."""
+    """Convolutions that halve the frame rate, as many that double it, and skip connections between equal rates."""
 
     channels: int
     depth: int
@@ -85,7 +85,7 @@ class UNet(nn.Module):
 
 
 class Translator(nn.Module):
-    """Audio to the values of a pose, as z-scores."""
+    """The translation network: audio to poses as z-scores (the generator of the GAN)."""
 
     config: Speech2GestureConfig
     features: int
@@ -101,7 +101,7 @@ class Translator(nn.Module):
 
 
 class Discriminator(nn.Module):
-    """Scores of overlapping patches of motion, given as differences of frames: 1 for true ones, 0 for generated."""
+    """Outputs for overlapping patches of motion, given as differences of frames: 1 for true ones, 0 for generated."""
 
     channels: Sequence[int]
     normalise: bool
@@ -112,22 +112,24 @@ class Discriminator(nn.Module):
         last = len(self.channels) - 1
         for layer, features in enumerate(self.channels):
             x = StridedConv1D(features, stride=1 if layer == last else 2)(x)
-            # The first layer shows how large motion is, which normalising would hide.
+            # No normalisation in the first layer: it would remove the amplitude of the motion.
             x = Activation(self.normalise and layer > 0)(x)
         return StridedConv1D(1, stride=1)(x)[..., 0]
 
 
-def generator_halo(config: Speech2GestureConfig) -> int:
-    """Frames on either side that an output frame depends on, at the place in the stride where they are most."""
+def translator_halo(config: Speech2GestureConfig) -> int:
+    """Frames on either side that an output frame depends on, for the position in the stride that has most of them."""
     return max(
-        max(frame - first, last - frame) for frame in range(config.stride) for first, last in [_sees(config, frame)]
+        max(frame - first, last - frame)
+        for frame in range(config.stride)
+        for first, last in [_audio_range(config, frame)]
     )
 
 
-def _sees(config: Speech2GestureConfig, frame: int) -> tuple[int, int]:
-    """First and last frame of audio that an output frame depends on, followed back through the layers."""
+def _audio_range(config: Speech2GestureConfig, frame: int) -> tuple[int, int]:
+    """First and last frame of audio that an output frame depends on, traced back through the layers."""
     first, last = frame - config.decoder_layers, frame + config.decoder_layers
-    for _ in range(config.depth):  # down to the bottom through the convolutions of the way up, which see farthest
+    for _ in range(config.depth):  # through the convolutions after upsampling, which reach farthest
         first, last = (first - 1) // 2, (last + 1) // 2
     for _ in range(config.depth):
         first, last = 2 * first - 1, 2 * last + 2

@@ -6,7 +6,7 @@ from jaxtyping import Array, Bool, Float, Key
 
 
 def windows(x: Float[Array, "B T C"], frames: int) -> Float[Array, "B _ frames C"]:
-    """Every stretch of so many frames, oldest first; ``T - frames + 1`` of them."""
+    """Every stretch of ``frames`` frames, oldest first; ``T - frames + 1`` of them."""
     count = x.shape[1] - frames + 1
     return jnp.stack([x[:, first : first + count] for first in range(frames)], axis=2)
 

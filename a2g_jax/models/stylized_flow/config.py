@@ -30,42 +30,41 @@ class StylizedFlowConfig:
     frame_dropout: float = 0.4
     """Share of the conditioning poses that are masked in training, so that the audio matters."""
     input_noise: float = 0.02
-    """Standard deviation of the noise on poses whose likelihood is taken, in z-scores; 0 for none.
+    """Standard deviation of the noise on poses whose likelihood is computed, in z-scores; 0 for none.
 
-    Channels that hardly move, or that follow from others as the six numbers of a rotation do, have a density without
-    bound: the likelihood grows by fitting them alone, and its gradient with it. The noise bounds it; the papers name
-    none.
+    Channels that hardly move, or that follow from others as the six numbers of a rotation do, have an unbounded
+    density: the likelihood and its gradient grow by fitting only them. The noise bounds it; the papers mention none.
     """
     predictor: bool = False
-    """Whether the first layer subtracts a linear extrapolation of each channel and whitens what is left, fitted to the
+    """Whether the first layer subtracts a linear extrapolation of each channel and whitens the residual, fitted to the
     first batch: see :mod:`a2g_jax.nn.flow.predictor`. The published flows have none; without it a small flow of smooth
     motion stays far behind a linear one for thousands of steps. ``frame_dropout`` masks none of its poses.
     """
     freedom: float = 50.0
     """Degrees of freedom of the Student-t prior; 0 for a normal one (MoGlow)."""
     global_channels: int = 32
-    """Values of the global feature; 0 for no global encoder."""
+    """Width of the global feature; 0 for no global encoder."""
     encoder_channels: int = 256
-    """Of the convolutions of the global encoder."""
+    """Channels of the convolutions of the global encoder."""
     encoder_blocks: int = 5
-    """Residual blocks of each of its two networks."""
+    """Residual blocks of each of the global encoder's two networks."""
     embedding_channels: int = 64
-    """Values that each of its two networks gives."""
+    """Width of the embedding of each of the global encoder's two networks."""
     reverse_share: float = 0.2
     """Share of the batches that also take the reverse pass; every fifth in the authors' code."""
     reconstruction_weight: float = 1.0
-    """Of the L1 distance of poses that the reverse pass makes; 0 for none."""
+    """Weight of the L1 distance of poses generated in the reverse pass; 0 for none."""
     perceptual_weight: float = 0.0
-    """Of the gesture perceptual loss (Eq. 8), 0.1 in the paper; needs ``a2g train --features RUN``."""
+    """Weight of the gesture perceptual loss (Eq. 8), 0.1 in the paper; needs ``a2g train --features RUN``."""
     style_controls: tuple[str, ...] = ()
     """Conditioning on the motion of the hands: any of height, left_height, right_height, speed and radius.
 
     Averages of the clip's own poses over four seconds, never masked. The likelihood is then that of poses given their
-    averages, and compares with no model without them.
+    averages, and cannot be compared with that of a model without them.
     """
     clip_frames: int = 120
     """Frames in a training clip; the first ``history_frames`` and the last ``lookahead_frames`` are conditioning
-    alone."""
+    only."""
 
     def __post_init__(self) -> None:
         for name in (
@@ -133,13 +132,13 @@ PRESETS: dict[str, StylizedFlowConfig] = {
     ),
 }
 """``paper`` and ``ted``: the stylized flow on Trinity and on TED. ``moglow``: the settings that MoGlow's authors prefer
-for StyleGestures, apart from our ``input_noise``, which theirs lacks (``--input-noise 0``). ``moglow_styled``: the same
-with style controls, all in one model, and the height that of both hands; StyleGestures trains one model for each
-control, and its height is that of the right hand (``--style-controls right_height``). How each is trained:
+for StyleGestures, apart from our ``input_noise``, which they do not have (``--input-noise 0``). ``moglow_styled``: the
+same with style controls, all in one model, and the height that of both hands; StyleGestures trains one model for each
+control, and its height is that of the right hand (``--style-controls right_height``). Training settings:
 :data:`TRAINING_PRESETS`.
 """
 
-#: Both flows clip gradients, and their learning rate rises and falls in the same way.
+#: Both flows clip gradients and have the same learning-rate schedule.
 _FLOW = TrainConfig(
     steps=80_000, learning_rate=1.5e-3, schedule="noam", warmup_steps=3_000, clip_value=5.0, clip_norm=100.0
 )

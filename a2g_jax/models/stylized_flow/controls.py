@@ -18,7 +18,7 @@ from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed
 from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.models.base import Data
 
-#: The controls, and the value that networks take as 1 (m, m/s): about the standard deviation over clips of talk.
+#: The controls, and the value that networks take as 1 (m, m/s): about the standard deviation over clips of speech.
 SCALES = {"height": 0.1, "left_height": 0.1, "right_height": 0.1, "speed": 0.1, "radius": 0.05}
 
 
@@ -38,7 +38,7 @@ def check_controls(names: Sequence[str], data: Data) -> None:
     lacking = {"L_Wrist", "R_Wrist"} - set(named_joints(data.space.body.names))
     if lacking:
         raise InputError(
-            f"--style-controls: the skeleton has no joint with a name of {', '.join(sorted(lacking))};"
+            f"--style-controls: the skeleton has no joint named {', '.join(sorted(lacking))};"
             " prepare the corpus with --joints body, or leave the controls out."
         )
 
@@ -46,7 +46,7 @@ def check_controls(names: Sequence[str], data: Data) -> None:
 def measure(names: Sequence[str], data: Data, pose: Float[Array, "B T R D"]) -> Float[Array, "B T K"]:
     """The controls of every frame of clips, metres and m/s.
 
-    Windows are cut at the ends of a clip. The root joint lies at the origin, so that walking is no speed of the hands.
+    Windows are cut at the ends of a clip. The root joint is at the origin, so walking does not count as hand speed.
 
     Args:
         pose: rotations of a skeleton.
@@ -73,13 +73,13 @@ def measure(names: Sequence[str], data: Data, pose: Float[Array, "B T R D"]) -> 
 
 
 def scaled(names: Sequence[str], controls: Float[Array, "*S K"]) -> Float[Array, "*S K"]:
-    """Controls as networks take them."""
+    """Controls divided by their scales, as networks take them."""
     scales = jnp.asarray([SCALES[name] for name in names], controls.dtype)
     return controls / scales.reshape((1,) * (controls.ndim - 1) + (len(names),))
 
 
 def requested(percentiles: Float[Array, "T K"], training: Float[Array, "N K"]) -> Float[Array, "T K"]:
-    """Values of requested percentiles, metres and m/s.
+    """Control values of requested percentiles, metres and m/s.
 
     Args:
         training: mean controls of every training clip.

@@ -1,4 +1,4 @@
-"""The global encoder (Sec. 3.4, Fig. 4): told poses and told audio become one feature of a frame."""
+"""The global encoder (Sec. 3.4, Fig. 4): conditioning poses and audio to one feature of a frame."""
 
 from flax import linen as nn
 from jaxtyping import Array, Float
@@ -8,10 +8,10 @@ from a2g_jax.nn.strided import StridedConv1D
 
 
 class WindowEncoder(nn.Module):
-    """A TCN over the stretch that a frame is told of, averaged over time.
+    """A TCN over the conditioning window of a frame, averaged over time.
 
-    Layer normalisation takes the place of the authors' batch normalisation: it has no running statistics, and what a
-    frame's feature is does not depend on the batch.
+    Layer normalisation replaces the authors' batch normalisation: it has no running statistics, and the feature of a
+    frame does not depend on the batch.
     """
 
     channels: int

@@ -5,8 +5,8 @@ logarithms add up to that of the whole, since the density of a frame depends on 
 
 Poses have a little normal noise in training (``input_noise``), so the learned density is that of poses *plus noise*:
 the true one convolved with a normal distribution of that width. It is evaluated at the pose itself, with the poses
-before it as they are: nothing is drawn, and the same motion always gets the same values. So a value measures the
-probability mass around a pose, no finer than the noise; where a channel never moves it stays bounded. At the pose
+before it unchanged: nothing is drawn, and the same motion always gets the same values. So a value measures the
+probability mass around a pose, no finer than the noise; it stays bounded where a channel never moves. At the pose
 itself such a channel counts half a nat more than the noisy poses of training do on average, so the mean over a
 held-out motion is a little above the log-likelihood that training reports;
 :func:`a2g_jax.evaluation.likelihood.bits_per_dim` gives both.
@@ -28,7 +28,7 @@ def log_likelihood(
     """Log-density of each frame in nats, and the latents.
 
     Args:
-        flat: z-scores of whole clips; the frames with history and lookahead are scored.
+        flat: z-scores of whole clips; the frames with history and lookahead are evaluated.
         given: conditioning of those frames.
     """
     z, log_det = networks.latents(params, networks.inner(flat), given)
@@ -39,13 +39,13 @@ def make_density(networks: FlowNetworks) -> Density:
     """The model's density: see :class:`a2g_jax.models.base.Density`."""
     config = networks.config
 
-    def score(
+    def frame_log_likelihood(
         params: Params,
         audio: Float[Array, "B T bands"],
         pose: Float[Array, "B T R D"],
         clean: Float[Array, "B T R D"] | None = None,
     ) -> Float[Array, "B N"]:
-        """Nats of the frames with history and lookahead; hidden states are zero before the first of them."""
+        """Log-density in nats of the frames with history and lookahead; hidden states are zero before them."""
         flat = networks.flat(pose)
         controls = None if clean is None else networks.controls(clean)
         given = networks.conditioning(params, audio, flat, controls=controls)
@@ -57,9 +57,11 @@ def make_density(networks: FlowNetworks) -> Density:
     def conditioning(
         audio: Float[Array, "B T bands"], pose: Float[Array, "B T R D"], clean: Float[Array, "B T R D"]
     ) -> tuple[Float[Array, "B N D"], Float[Array, "B N C"]]:
-        """Pose history, audio window and style controls of the scored frames, and their z-scores."""
+        """Pose history, audio window and style controls of the evaluated frames, and their z-scores."""
         flat = plain.flat(pose)
         given = plain.conditioning({}, audio, flat, controls=plain.controls(clean))
         return jnp.concatenate([given.history, given.context], axis=-1), plain.inner(flat)
 
-    return Density(score, conditioning, config.history_frames, config.lookahead_frames, config.input_noise)
+    return Density(
+        frame_log_likelihood, conditioning, config.history_frames, config.lookahead_frames, config.input_noise
+    )

@@ -37,7 +37,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     def noisy(key: Key[Array, ""], flat: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
         if config.input_noise == 0:
             return flat
-        # Drawn once: XLA would draw it anew, in code of its own, for each of the many windows that use it, and compile
+        # Drawn once: otherwise XLA repeats the draw in the code of each of the many windows that use it, and compiles
         # for minutes.
         noise = jax.lax.optimization_barrier(jax.random.normal(key, flat.shape, flat.dtype))
         return flat + config.input_noise * noise
@@ -45,7 +45,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
-        """Bits per frame, and on a share of the batches the losses of the reverse pass."""
+        """Bits per frame, and for a share of the batches the losses of the reverse pass."""
         del step
         mask_key, which_key, reverse_key, noise_key = jax.random.split(key, 4)
         flat = noisy(noise_key, networks.flat(batch.pose))
@@ -57,11 +57,11 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         if not config.reverses:
             return bits, terms
         taken = jax.random.bernoulli(which_key, config.reverse_share)
-        nothing = lambda: (jnp.zeros(()), jnp.zeros(()))  # noqa: E731
+        skipped = lambda: (jnp.zeros(()), jnp.zeros(()))  # noqa: E731
         reconstruction, perceptual = jax.lax.cond(
-            taken, lambda: reverse(params, reverse_key, batch.pose, flat, given), nothing
+            taken, lambda: reverse(params, reverse_key, batch.pose, flat, given), skipped
         )
-        # Reported as they are on a batch that takes the pass.
+        # Reported so that the mean over batches is that of the batches with the pass.
         share = max(config.reverse_share, 1e-9)
         terms |= {"reconstruction": reconstruction / share, "perceptual": perceptual / share}
         return bits + config.reconstruction_weight * reconstruction + config.perceptual_weight * perceptual, terms
@@ -77,7 +77,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         )
 
     def warm_start(params: Params, batch: Batch) -> Params:
-        """Actnorms set from the first batch, as likelihoods see it."""
+        """Parameters with actnorms fitted to the first batch, with the noise of training."""
         flat = noisy(jax.random.key(0), networks.flat(batch.pose))
         return networks.fitted(params, batch.audio, flat, networks.controls(batch.pose))
 
@@ -96,7 +96,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         return means
 
     def condition(params: Params, summary: Summary, given: Condition) -> AudioContext:
-        """The share of the conditioning that depends on no pose."""
+        """The part of the conditioning that does not depend on poses."""
         controls = None
         if given.controls is not None:
             controls = requested(given.controls, jnp.asarray(summary["control_mean"]))
@@ -105,7 +105,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     def begin(
         params: Params, summary: Summary, key: Key[Array, ""], seed_poses: Float[Array, "S R D"] | None = None
     ) -> State:
-        """The seed poses, or the mean pose, before the first frame, and hidden states at zero."""
+        """State before the first frame: the seed poses or the mean pose, and hidden states of zero."""
         del summary, key
         return networks.start(params, 1, None if seed_poses is None else networks.flat(seed_poses[None])[0])
 
@@ -122,11 +122,11 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], given: AudioContext, start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
-        """A motion from its first frame."""
+        """A motion from frame ``start`` on, after the mean pose."""
         return proceed(params, summary, key, given, start, begin(params, summary, key))[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
-        """The most likely frame after the true ones before it; the ends of a clip as they are."""
+        """Each frame of latent zero, given the true frames before it; the ends of a clip are unchanged."""
         flat = networks.flat(batch.pose)
         given = networks.conditioning(params, batch.audio, flat)
         likely = networks.motion(params, jnp.zeros_like(networks.inner(flat)), given)
@@ -136,7 +136,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     def encode(
         params: Params, audio: Float[Array, "T bands"], pose: Float[Array, "T R D"], controls: Float[Array, "T K"]
     ) -> Float[Array, "N C"]:
-        """Latents of a clip's frames under its own speech and its own poses before them."""
+        """Latents of a clip's frames, given its own speech and its own poses before them."""
         flat = networks.flat(pose[None])
         given = networks.conditioning(params, audio[None], flat, controls=controls[None])
         return networks.latents(params, networks.inner(flat), given)[0][0]
@@ -179,7 +179,7 @@ def draw_latents(
 
 
 def _likelihood(networks: FlowNetworks) -> Any:
-    """Bits per frame of the frames of clips."""
+    """A function of clips: the mean bits per frame, and terms."""
 
     def bits(
         params: Params, flat: Float[Array, "B T C"], given: Conditioning
@@ -192,7 +192,7 @@ def _likelihood(networks: FlowNetworks) -> Any:
 
 
 def _reverse(networks: FlowNetworks) -> Any:
-    """Distances from the truth of what random latents become after the true poses (Sec. 3.2 and 3.3)."""
+    """Losses of the reverse pass: distance from the truth of frames of random latents (Sec. 3.2 and 3.3)."""
     config, data = networks.config, networks.data
 
     def losses(

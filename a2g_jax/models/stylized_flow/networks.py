@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Key
+from jaxtyping import Array, Bool, Float, Key
 
 from a2g_jax.models.base import Data, Latents, Params, Summary
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
@@ -47,12 +47,12 @@ class Conditioning(NamedTuple):
 
 
 class AudioContext(NamedTuple):
-    """The share of the conditioning of T frames that depends on no pose, computed before the scan over frames."""
+    """The part of the conditioning of T frames that does not depend on poses, computed before the scan over frames."""
 
     projected: tuple[Array, ...]
-    """For each step of the flow, (T, gates)."""
+    """Projection of the context for each step of the flow, (T, gates)."""
     embedding: Float[Array, "T E"]
-    """Of the audio, for the global encoder; E is 0 without one."""
+    """Embedding of the audio, for the global encoder; E is 0 without one."""
     latents: Latents
     """Mean and scale of the latents: 0 and 1 where they are drawn."""
 
@@ -67,16 +67,16 @@ class State(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The range of each channel in training motion, z-scores; generated poses beyond it are drawn back.
+    """The range of each channel in training motion, z-scores; generated poses beyond it are pulled back.
 
-    Errors of a frame enter the next one, and in minutes they add up in channels that hardly move, as in ankles.
+    Errors of a frame enter the next one, and over minutes they accumulate in channels that hardly move, such as ankles.
     """
 
     low: Float[Array, " C"]
     high: Float[Array, " C"]
 
     def kept(self, x: Float[Array, "B C"]) -> Float[Array, "B C"]:
-        """Poses with what lies beyond the range reduced by a half: a spring, so that nothing stops within a frame."""
+        """Poses with half of the excess over the range removed: a spring, so that no motion stops within a frame."""
         return x - 0.5 * (x - jnp.clip(x, self.low[None], self.high[None]))
 
 
@@ -100,7 +100,7 @@ class FlowNetworks:
         self._fusion = Fusion(config.encoder_channels, config.global_channels)
 
     def init(self, key: Key[Array, ""]) -> Params:
-        """Before the actnorms are fitted to data."""
+        """Initial parameters, before the actnorms are fitted to data."""
         config, keys = self.config, jax.random.split(key, 4)
         params: Params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
         if config.predictor:
@@ -132,10 +132,10 @@ class FlowNetworks:
         params: Params,
         audio: Float[Array, "B T bands"],
         flat: Float[Array, "B T C"],
-        mask: Array | None = None,
+        mask: Bool[Array, "B N history"] | None = None,
         controls: Float[Array, "B T K"] | None = None,
     ) -> Conditioning:
-        """For the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
+        """Conditioning of the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
 
         Args:
             mask: which conditioning poses stay, (B, N, history); None for all.
@@ -203,7 +203,7 @@ class FlowNetworks:
         flat: Float[Array, "B T C"],
         controls: Float[Array, "B T K"] | None = None,
     ) -> Params:
-        """Actnorms and the linear first layer set from a batch; arguments of :meth:`conditioning`."""
+        """Parameters with actnorms and the linear first layer fitted to a batch; arguments of :meth:`conditioning`."""
         x = self.inner(flat)
         if self.config.predictor:
             before = pose_history(flat, self.config.history_frames, self.config.lookahead_frames)
@@ -219,7 +219,7 @@ class FlowNetworks:
         controls: Float[Array, "T K"] | None = None,
         latents: Latents | None = None,
     ) -> AudioContext:
-        """For every frame of an audio; before and after it there are zeros.
+        """The context of every frame of an audio, padded with zeros.
 
         Args:
             controls: style controls, metres and m/s; zeros if None.
@@ -243,7 +243,7 @@ class FlowNetworks:
 
     @staticmethod
     def limits(summary: Summary) -> Limits | None:
-        """Of training motion; None where a run keeps none."""
+        """Limits of training motion; None for a summary without them."""
         if "pose_low" not in summary:
             return None
         return Limits(
@@ -251,7 +251,7 @@ class FlowNetworks:
         )
 
     def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> State:
-        """State before the first frame of so many sequences.
+        """State before the first frame of ``count`` sequences.
 
         Args:
             seed: z-scores of the poses before it; the mean pose if None.

@@ -1,4 +1,4 @@
-"""Settings of generation with the flow; they can change without touching a trained run."""
+"""Sampling settings of the flow; they can change without retraining."""
 
 from dataclasses import dataclass, field
 

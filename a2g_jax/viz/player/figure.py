@@ -21,7 +21,7 @@ class Track:
     spans: tuple[tuple[float | int, float | int, str, str], ...]
 
     def encoded(self) -> dict:
-        """As JSON for the page."""
+        """The lane as JSON for the page."""
         return {"name": self.name, "spans": [list(span) for span in self.spans]}
 
 
@@ -36,7 +36,7 @@ class Bars:
     bars: tuple[tuple[float | int, float | int, float | int, str, str], ...]
 
     def encoded(self) -> dict:
-        """As JSON for the page."""
+        """The lane as JSON for the page."""
         return {"name": self.name, "bars": [list(bar) for bar in self.bars]}
 
 
@@ -51,7 +51,7 @@ class Curve:
     unit: str = ""
 
     def encoded(self) -> dict:
-        """As JSON for the page."""
+        """The lane as JSON for the page."""
         values = [round(float(value), 2) if np.isfinite(value) else None for value in self.values]
         return {"name": self.name, "rate": self.rate, "values": values, "unit": self.unit}
 
@@ -87,7 +87,7 @@ class Hands:
     marks: tuple[Mark, ...] = ()
 
     def encoded(self) -> dict:
-        """As JSON for the page."""
+        """The lane as JSON for the page."""
         return {
             "name": self.name,
             "left": [list(span) for span in self.left],
@@ -102,7 +102,7 @@ Lane = Track | Bars | Curve | Hands
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """One moving body of the page, with the text under it."""
+    """One motion of the page, with the text under it."""
 
     motion: Motion
     label: str

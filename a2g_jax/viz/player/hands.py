@@ -80,11 +80,11 @@ def finger_radii(finger: Finger, size: float) -> list[float]:
     return [float(radius) * share for radius in np.interp(stations, range(4), table)]
 
 
-def relaxed_hand(size: float, palm_side: float) -> list[tuple[np.ndarray, list[float], bool]]:
+def relaxed_hand(size: float, palm_side: float) -> list[tuple[Float[np.ndarray, "4 3"], list[float], bool]]:
     """Fingers of a relaxed hand: points (4, 3) along x thumbward, y to the tips, z; their radii; whether a thumb.
 
     Args:
-        size: 1 for a body of 1.7 m.
+        size: 1 for an adult of 1.7 m.
         palm_side: sign of z on the palm's side.
     """
     fingers = []

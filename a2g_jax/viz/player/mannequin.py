@@ -4,15 +4,15 @@ import numpy as np
 
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.viz.player.hands import find_fingers, finger_radii, relaxed_hand
-from a2g_jax.viz.player.parts import Anchor, Body
+from a2g_jax.viz.player.parts import Anchor, Shape
 from a2g_jax.viz.player.roles import Limb, Roles, rest_positions
 
 
 class Mannequin:
-    """Adds the parts of a human body; sizes are those of a 1.7 m adult times ``size``."""
+    """Adds the parts of a person to a shape; sizes are those of a 1.7 m adult times ``size``."""
 
-    def __init__(self, body: Body, skeleton: Skeleton, roles: Roles, ends: dict[int, int]) -> None:
-        self.body, self.skeleton, self.roles, self.ends = body, skeleton, roles, ends
+    def __init__(self, shape: Shape, skeleton: Skeleton, roles: Roles, ends: dict[int, int]) -> None:
+        self.shape, self.skeleton, self.roles, self.ends = shape, skeleton, roles, ends
         self.rest = rest_positions(skeleton)
         self.drawn: set[int] = set()
         """Joints whose bone to the parent needs no capsule of its own."""
@@ -42,11 +42,11 @@ class Mannequin:
         return path
 
     def torso(self) -> None:
-        """Chest, belly and hips with clothes; shoulders and the muscles from there to the neck."""
-        body, roles, size, rest = self.body, self.roles, self.size, self.rest
+        """Add chest, belly and hips with clothes; shoulders and the muscles from there to the neck."""
+        shape, roles, size, rest = self.shape, self.roles, self.size, self.rest
         left, right = roles.arms["left"].top, roles.arms["right"].top
         top = roles.neck if roles.neck is not None else left
-        chest = body.frame(roles.chest, top, left, right)
+        chest = shape.frame(roles.chest, top, left, right)
         axis = _unit(rest[top] - rest[roles.chest], self.up)
         height = float(((rest[left] + rest[right]) / 2 - rest[roles.chest]) @ axis)
         half = float(np.linalg.norm(rest[left] - rest[right])) / 2
@@ -54,51 +54,51 @@ class Mannequin:
         oval = {"frame": chest, "flat": 0.70}
         ribs: Anchor = (chest, 0.0, height - 0.10 * size, 0.0)
         if roles.chest == roles.pelvis:
-            body.add((chest, 0, height - 0.3 * size, 0), ribs, (0.8 * broad, broad), shades=True, **oval)
+            shape.add((chest, 0, height - 0.3 * size, 0), ribs, (0.8 * broad, broad), shades=True, **oval)
         elif roles.legs:
-            body.add(self.hips(), ribs, (0.116 * size, broad), shades=True, **oval)
+            shape.add(self.hips(), ribs, (0.116 * size, broad), shades=True, **oval)
         else:
-            body.add((roles.pelvis,), ribs, (0.124 * size, broad), shades=True, **oval)
+            shape.add((roles.pelvis,), ribs, (0.124 * size, broad), shades=True, **oval)
         # The shoulder girdle: across the chest, and sloping up to the neck.
         across = max(half - 0.075 * size, 0.03 * size)
         girdle = [(chest, sign * across, height - 0.045 * size, -0.006 * size) for sign in (1.0, -1.0)]
-        body.add(girdle[0], girdle[1], (0.068 * size, 0.068 * size), frame=chest, flat=0.95)
+        shape.add(girdle[0], girdle[1], (0.068 * size, 0.068 * size), frame=chest, flat=0.95)
         for side, sign in (("left", 1.0), ("right", -1.0)):
             shoulder = roles.arms[side].top
             collar: Anchor = (chest, sign * 0.028 * size, height + 0.040 * size, -0.012 * size)
-            body.add(collar, (shoulder,), (0.047 * size, 0.054 * size))
+            shape.add(collar, (shoulder,), (0.047 * size, 0.054 * size))
             self.drawn.update(self._path(shoulder, roles.chest))
         if roles.neck is not None:
             low, high = (chest, 0, height + 0.03 * size, -0.008 * size), (chest, 0, height + 0.06 * size, -0.006 * size)
-            body.add(low, high, (0.068 * size, 0.055 * size))
+            shape.add(low, high, (0.068 * size, 0.055 * size))
         for joint in (roles.chest, *(leg.top for leg in roles.legs.values())):
             self.drawn.update(self._path(joint, roles.pelvis))
 
     def hips(self) -> Anchor:
         """Add the upper part of the trousers; returns the anchor where the shirt begins."""
-        body, roles, size, rest = self.body, self.roles, self.size, self.rest
+        shape, roles, size, rest = self.shape, self.roles, self.size, self.rest
         hips = [roles.legs[side].top for side in ("left", "right")]
-        pelvis = body.frame(roles.pelvis, roles.chest, hips[0], hips[1])
+        pelvis = shape.frame(roles.pelvis, roles.chest, hips[0], hips[1])
         apart = max(float(np.linalg.norm(rest[hips[0]] - rest[hips[1]])) / 2, 1e-6)
         # Rigs differ in how far apart they put the hips; thighs start no further out than this.
         self.inset = float(np.clip((1 - 0.08 * size / apart) / 2, 0.0, 0.4))
         oval = {"tint": "legs", "frame": pelvis}
         low, high = (pelvis, 0, -0.045 * size, 0), (pelvis, 0, 0.05 * size, 0)
-        body.add(low, high, (0.140 * size, 0.122 * size), flat=0.79, shades=True, **oval)
+        shape.add(low, high, (0.140 * size, 0.122 * size), flat=0.79, shades=True, **oval)
         seat = [(pelvis, sign * 0.055 * size, -0.068 * size, -0.004 * size) for sign in (1.0, -1.0)]
-        body.add(seat[0], seat[1], (0.095 * size, 0.095 * size), flat=1.0, **oval)
+        shape.add(seat[0], seat[1], (0.095 * size, 0.095 * size), flat=1.0, **oval)
         return (pelvis, 0, 0.065 * size, 0)
 
     def head(self) -> None:
         """Add neck, skull and jaw, hair, and a face that shows the direction of the head from afar."""
-        body, roles, size = self.body, self.roles, self.size
+        shape, roles, size = self.shape, self.roles, self.size
         if roles.head is None or roles.neck is None:
             return
         head = roles.head
         below = self._path(head, roles.chest)[::-1]
         self.drawn.update(below, self._under(head))
         for first, second in zip(below, below[1:], strict=False):
-            body.add((first,), (second,), (0.048 * size, 0.047 * size), tint="skin")
+            shape.add((first,), (second,), (0.048 * size, 0.047 * size), tint="skin")
         frame, top = self.head_frame(head)
 
         def at(x: float | int, y: float | int, z: float | int) -> Anchor:
@@ -106,7 +106,7 @@ class Mannequin:
             return (frame, x * size, top - y * size, z * size)
 
         def part(start: Anchor, end: Anchor, radii: tuple[float, float], tint: str, **more) -> None:
-            body.add(start, end, (radii[0] * size, radii[1] * size), tint=tint, **more)
+            shape.add(start, end, (radii[0] * size, radii[1] * size), tint=tint, **more)
 
         oval = {"frame": frame, "axis": 0}
         part((head,), at(0, 0.13, -0.01), (0.05, 0.05), "skin")
@@ -124,7 +124,7 @@ class Mannequin:
 
     def head_frame(self, head: int) -> tuple[int, float]:
         """A frame at the head's joint, and the height of the crown above it, metres."""
-        body, size = self.body, self.size
+        shape, size = self.shape, self.size
         up = self.up
         top = 0.205 * size
         end = self.ends.get(head)
@@ -133,7 +133,7 @@ class Mannequin:
             end = next((j for j in self._under(head) if "end" in self.skeleton.names[j].lower()), None)
         if end is not None:
             offset = (
-                np.asarray(body.points[end][1]) if end >= self.skeleton.joints else self.rest[end] - self.rest[head]
+                np.asarray(shape.points[end][1]) if end >= self.skeleton.joints else self.rest[end] - self.rest[head]
             )
             length = float(np.linalg.norm(offset))
             if length > 0.05 * size:
@@ -142,15 +142,15 @@ class Mannequin:
             else:
                 end = None
         if end is None:
-            end = body.point(head, up * top)
+            end = shape.point(head, up * top)
         left = _unit(self.left - up * (self.left @ up), np.array([1.0, 0, 0]))
-        return body.frame(head, end, body.point(head, left * 0.1 * size), head), top
+        return shape.frame(head, end, shape.point(head, left * 0.1 * size), head), top
 
     def arm(self, side: str, arm: Limb) -> None:
         """Add sleeves and a hand."""
-        body, size = self.body, self.size
-        body.add((arm.top,), (arm.middle,), (0.055 * size, 0.043 * size), shades=True)
-        body.add((arm.middle,), (arm.tip,), (0.043 * size, 0.031 * size), shades=True)
+        shape, size = self.shape, self.size
+        shape.add((arm.top,), (arm.middle,), (0.055 * size, 0.043 * size), shades=True)
+        shape.add((arm.middle,), (arm.tip,), (0.043 * size, 0.031 * size), shades=True)
         self.drawn.update(self._path(arm.middle, arm.top), self._path(arm.tip, arm.middle))
         self.drawn.update(j for j in self._under(arm.top) if np.allclose(self.skeleton.offsets[j], 0))
         under = self._under(arm.tip)
@@ -161,15 +161,15 @@ class Mannequin:
         along = _unit(np.mean(knuckles, axis=0), forearm) if knuckles else forearm
         tip = self.ends.get(arm.tip)
         if tip is None:
-            tip = body.point(arm.tip, along * 0.18 * size)
-        elif np.linalg.norm(body.points[tip][1]) > 0.02 * size:
-            along = _unit(np.asarray(body.points[tip][1]), along)
+            tip = shape.point(arm.tip, along * 0.18 * size)
+        elif np.linalg.norm(shape.points[tip][1]) > 0.02 * size:
+            along = _unit(np.asarray(shape.points[tip][1]), along)
         # At rest the thumbs of every common rig point forward: palms down in a T-pose, inward with arms at the sides.
         thumbs = [self.rest[finger.joints[-1]] - self.rest[arm.tip] for finger in fingers if finger.thumb]
         thumbs += [self.rest[j] - self.rest[arm.tip] for j in under if "thumb" in self.skeleton.names[j].lower()]
         toward = thumbs[0] if thumbs else self.front
         toward = _unit(toward - along * (toward @ along), self.front)
-        frame = body.frame(arm.tip, tip, body.point(arm.tip, toward * 0.1 * size), arm.tip)
+        frame = shape.frame(arm.tip, tip, shape.point(arm.tip, toward * 0.1 * size), arm.tip)
         palm_side = -1.0 if side == "left" else 1.0
         digits: list[tuple[list[Anchor], list[float], bool]] = []
         for finger in fingers:
@@ -181,40 +181,40 @@ class Mannequin:
 
     def hand(self, frame: int, palm_side: float, digits: list[tuple[list[Anchor], list[float], bool]]) -> None:
         """Add a wrist, the bones of the palm to each knuckle, the ball of the thumb, and the fingers."""
-        body, size = self.body, self.size
+        shape, size = self.shape, self.size
 
         def at(x: float | int, y: float | int, z: float | int) -> Anchor:
             return (frame, x * size, y * size, palm_side * z * size)
 
         flat = {"tint": "skin", "frame": frame, "axis": 2}
-        body.add(at(0, -0.004, 0), at(0, 0.024, 0), (0.026 * size, 0.025 * size), flat=0.8, **flat)
-        body.add(at(0, 0.022, 0), at(-0.006, 0.066, 0), (0.026 * size, 0.034 * size), flat=0.42, **flat)
+        shape.add(at(0, -0.004, 0), at(0, 0.024, 0), (0.026 * size, 0.025 * size), flat=0.8, **flat)
+        shape.add(at(0, 0.022, 0), at(-0.006, 0.066, 0), (0.026 * size, 0.034 * size), flat=0.42, **flat)
         rays = [anchors[0] for anchors, _, thumb in digits if not thumb]
         for number, knuckle in enumerate(rays):
             spread = (0.5 - number / max(len(rays) - 1, 1)) * 0.024
             start = at(spread, 0.016, 0) if len(knuckle) == 4 else at(0, 0.016, 0)
-            body.add(start, knuckle, (0.0135 * size, 0.0118 * size), tint="skin")
+            shape.add(start, knuckle, (0.0135 * size, 0.0118 * size), tint="skin")
         for anchors, radii, thumb in digits:
             if thumb:
-                body.add(at(0.004, 0.018, 0.004), anchors[0], (0.018 * size, 0.0165 * size), tint="skin")
+                shape.add(at(0.004, 0.018, 0.004), anchors[0], (0.018 * size, 0.0165 * size), tint="skin")
             for index in range(len(anchors) - 1):
-                body.add(anchors[index], anchors[index + 1], (radii[index], radii[index + 1]), tint="skin")
+                shape.add(anchors[index], anchors[index + 1], (radii[index], radii[index + 1]), tint="skin")
 
     def fingertip(self, joints: tuple[int, ...]) -> int:
         """The point at the end of a finger's last bone; a guess where the skeleton has none."""
         last = joints[-1]
         end = self.ends.get(last)
-        if end is not None and np.linalg.norm(self.body.points[end][1]) > 0.004 * self.size:
+        if end is not None and np.linalg.norm(self.shape.points[end][1]) > 0.004 * self.size:
             return end
         before = np.asarray(self.skeleton.offsets[last], np.float64)
-        return self.body.point(last, before * min(0.85, 0.022 * self.size / max(float(np.linalg.norm(before)), 1e-6)))
+        return self.shape.point(last, before * min(0.85, 0.022 * self.size / max(float(np.linalg.norm(before)), 1e-6)))
 
     def leg(self, leg: Limb) -> None:
         """Add a trouser leg and a shoe."""
-        body, size, rest = self.body, self.size, self.rest
+        shape, size, rest = self.shape, self.size, self.rest
         other = next(limb.top for limb in self.roles.legs.values() if limb.top != leg.top)
-        body.add((leg.top, other, self.inset), (leg.middle,), (0.086 * size, 0.058 * size), tint="legs", shades=True)
-        body.add((leg.middle,), (leg.tip,), (0.058 * size, 0.046 * size), tint="legs", shades=True)
+        shape.add((leg.top, other, self.inset), (leg.middle,), (0.086 * size, 0.058 * size), tint="legs", shades=True)
+        shape.add((leg.middle,), (leg.tip,), (0.058 * size, 0.046 * size), tint="legs", shades=True)
         self.drawn.update(self._path(leg.middle, leg.top), self._path(leg.tip, leg.middle))
         under = self._under(leg.tip)
         self.drawn.update(under, (j for j in self._under(leg.top) if np.allclose(self.skeleton.offsets[j], 0)))
@@ -224,19 +224,19 @@ class Mannequin:
         low = 0.07 * size
         if toe is not None:
             low = float(np.clip((rest[leg.tip] - rest[toe]) @ self.up, 0.035 * size, 0.09 * size))
-        heel = body.point(leg.tip, -self.front * 0.028 * size - self.up * low)
+        heel = shape.point(leg.tip, -self.front * 0.028 * size - self.up * low)
         if toe is None or ahead[toe] < 0.08 * size:
-            ball = body.point(leg.tip, self.front * 0.135 * size - self.up * (low + 0.004 * size))
+            ball = shape.point(leg.tip, self.front * 0.135 * size - self.up * (low + 0.004 * size))
         else:
             ball = toe
         end = self.ends.get(toe) if toe is not None else None
-        far = end is not None and np.linalg.norm(body.points[end][1]) > 0.02 * size
+        far = end is not None and np.linalg.norm(shape.points[end][1]) > 0.02 * size
         reach = ahead[toe] if toe is not None else 0.0
         tip: Anchor = (end,) if far and end is not None else (heel, ball, 1.0 if reach > 0.17 * size else 1.32)
-        body.add((leg.tip,), (heel,), (0.038 * size, 0.037 * size), tint="shoe")
-        body.add((heel,), (heel, ball, 0.85), (0.037 * size, 0.041 * size), tint="shoe")
-        body.add((heel, ball, 0.8), tip, (0.041 * size, 0.03 * size), tint="shoe")
-        body.add((leg.tip,), (heel, ball, 0.75), (0.036 * size, 0.036 * size), tint="shoe")
+        shape.add((leg.tip,), (heel,), (0.038 * size, 0.037 * size), tint="shoe")
+        shape.add((heel,), (heel, ball, 0.85), (0.037 * size, 0.041 * size), tint="shoe")
+        shape.add((heel, ball, 0.8), tip, (0.041 * size, 0.03 * size), tint="shoe")
+        shape.add((leg.tip,), (heel, ball, 0.75), (0.036 * size, 0.036 * size), tint="shoe")
 
     def _under(self, joint: int) -> list[int]:
         """Descendants of ``joint``."""

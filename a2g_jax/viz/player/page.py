@@ -13,10 +13,10 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
 from a2g_jax.io.words import Word
-from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.encode import encode_audio, encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
-from a2g_jax.viz.player.stage import body_points, placement
+from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.stage import placement, shape_points
 
 #: Parts of the script, in their order in the page.
 _SCRIPTS = (
@@ -114,8 +114,8 @@ def _figure(figure: Figure) -> dict:
         raise InputError(f"figure {figure.label!r}: the motion has no frames; give it at least one.")
     if not motion.fps > 0:
         raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
-    body = build_body(motion.skeleton)
-    points = body_points(motion, body)
+    shape = build_shape(motion.skeleton)
+    points = shape_points(motion, shape)
     encoded = encode_positions(points, figure.label)
     return {
         "label": figure.label,
@@ -123,10 +123,10 @@ def _figure(figure: Figure) -> dict:
         "fps": motion.fps,
         "frames": motion.frames,
         "joints": list(motion.skeleton.names),
-        "points": len(body.points),
-        "axes": body.frames,
-        "shapes": [shape.encoded() for shape in body.shapes],
-        "wrists": list(body.wrists),
+        "points": len(shape.points),
+        "axes": shape.frames,
+        "shapes": [cone.encoded() for cone in shape.cones],
+        "wrists": list(shape.wrists),
         "place": placement(motion, points),
         "tracks": [track.encoded() for track in figure.tracks],
         **encoded,

@@ -25,7 +25,7 @@ class Limb:
 
 @dataclass(frozen=True)
 class Roles:
-    """Joint indices of a body; parts that the skeleton lacks are None or missing from the mapping."""
+    """Joint indices of a figure; parts that the skeleton lacks are None or missing from the mapping."""
 
     arms: dict[str, Limb]
     legs: dict[str, Limb]

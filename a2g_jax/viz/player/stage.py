@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.viz.player.body import Body
 from a2g_jax.viz.player.roles import find_roles
+from a2g_jax.viz.player.shape import Shape
 
 #: A figure whose mean heading is within this angle (radians) of +Z is not turned.
 _KEEP_HEADING = 0.6
@@ -13,10 +13,10 @@ _KEEP_HEADING = 0.6
 _KEEP_FLOOR = 0.12
 
 
-def body_points(motion: Motion, body: Body) -> Float[np.ndarray, "T P 3"]:
+def shape_points(motion: Motion, shape: Shape) -> Float[np.ndarray, "T P 3"]:
     """World positions of the joints, then of the points that are rigid to them, metres."""
     joints = motion.positions().astype(np.float64)
-    extra = body.points[motion.skeleton.joints :]
+    extra = shape.points[motion.skeleton.joints :]
     if not extra:
         return joints
     owners = np.array([joint for joint, _ in extra])

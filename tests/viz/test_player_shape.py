@@ -6,9 +6,9 @@ import pytest
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget import find_rig
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
-from a2g_jax.viz.player.body import build_body
 from a2g_jax.viz.player.roles import find_roles
-from a2g_jax.viz.player.stage import body_points, placement
+from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.stage import placement, shape_points
 from tests.viz.figures_for_tests import body_skeleton, waving
 
 MIXAMO = {
@@ -51,24 +51,24 @@ def test_the_limbs_are_those_that_retargeting_moves(rename):
         assert [arm.top, arm.middle, arm.tip] == [joints[f"{letter}_{part}"] for part in ("Shoulder", "Elbow", "Wrist")]
         assert [leg.top, leg.middle, leg.tip] == [joints[f"{letter}_{part}"] for part in ("Hip", "Knee", "Ankle")]
     assert found.arms["left"].tip == BODY_JOINTS.index("L_Wrist")
-    assert any(shape.tint == "eye" for shape in build_body(skeleton).shapes) == (found.head is not None)
+    assert any(cone.tint == "eye" for cone in build_shape(skeleton).cones) == (found.head is not None)
 
 
 def test_extra_points_are_rigid_to_their_joints():
     motion = waving(20)
-    body = build_body(motion.skeleton)
-    points = body_points(motion, body)
+    shape = build_shape(motion.skeleton)
+    points = shape_points(motion, shape)
     np.testing.assert_allclose(points[:, :22], motion.positions(), atol=1e-6)
-    for index, (joint, offset) in enumerate(body.points[22:], start=22):
+    for index, (joint, offset) in enumerate(shape.points[22:], start=22):
         apart = np.linalg.norm(points[:, index] - points[:, joint], axis=1)
         np.testing.assert_allclose(apart, np.linalg.norm(offset), atol=1e-5)
 
 
 def test_eyes_look_where_the_head_turns():
     motion = waving(60)
-    body = build_body(motion.skeleton)
-    points = body_points(motion, body)
-    origin, up, left, right = body.frames[body.shapes[[s.tint for s in body.shapes].index("eye")].start[0]]
+    shape = build_shape(motion.skeleton)
+    points = shape_points(motion, shape)
+    origin, up, left, right = shape.frames[shape.cones[[s.tint for s in shape.cones].index("eye")].start[0]]
     y, x = points[:, up] - points[:, origin], points[:, left] - points[:, right]
     front = np.cross(x, y)
     turn = 0.4 * np.sin(2 * np.pi * np.arange(60) / 30)
@@ -76,37 +76,37 @@ def test_eyes_look_where_the_head_turns():
 
 
 def test_parts_are_of_human_size_and_refer_to_what_exists():
-    body = build_body(body_skeleton())
-    for shape in body.shapes:
-        assert 0.003 < min(shape.start_radius, shape.end_radius) <= max(shape.start_radius, shape.end_radius) < 0.17
-        assert shape.frame < len(body.frames)
-        for anchor in (shape.start, shape.end):
-            assert int(anchor[0]) < (len(body.frames) if len(anchor) == 4 else len(body.points))
-    assert sum(shape.shades for shape in body.shapes) <= 14
+    shape = build_shape(body_skeleton())
+    for cone in shape.cones:
+        assert 0.003 < min(cone.start_radius, cone.end_radius) <= max(cone.start_radius, cone.end_radius) < 0.17
+        assert cone.frame < len(shape.frames)
+        for anchor in (cone.start, cone.end):
+            assert int(anchor[0]) < (len(shape.frames) if len(anchor) == 4 else len(shape.points))
+    assert sum(cone.shades for cone in shape.cones) <= 14
 
 
 def test_body_scales_with_the_skeleton():
-    small, large = build_body(body_skeleton()), build_body(body_skeleton().scaled(2.0))
-    for one, two in zip(small.shapes, large.shapes, strict=True):
+    small, large = build_shape(body_skeleton()), build_shape(body_skeleton().scaled(2.0))
+    for one, two in zip(small.cones, large.cones, strict=True):
         assert two.start_radius == pytest.approx(2 * one.start_radius, rel=1e-5)
 
 
 def test_a_tree_without_names_is_drawn_bone_by_bone():
     offsets = np.float32([[0, 0, 0], [0, 0.5, 0], [0, 0.5, 0], [0.3, 0, 0]])
-    body = build_body(Skeleton(offsets, ("a", "b", "c", "d"), (-1, 0, 1, 1), ends=((3, (0.2, 0.0, 0.0)),)))
-    assert len(body.shapes) == 4
-    assert len(body.points) == 5
+    shape = build_shape(Skeleton(offsets, ("a", "b", "c", "d"), (-1, 0, 1, 1), ends=((3, (0.2, 0.0, 0.0)),)))
+    assert len(shape.cones) == 4
+    assert len(shape.points) == 5
 
 
 def test_a_figure_that_faces_away_is_turned_to_the_front():
     motion = waving(10)
-    body = build_body(motion.skeleton)
+    shape = build_shape(motion.skeleton)
     half_turn = np.diag([-1.0, 1.0, -1.0]).astype(np.float32)
     rotations = np.array(motion.rotations)
     rotations[:, 0] = half_turn @ rotations[:, 0]
     turned = Motion(rotations, motion.root, motion.skeleton, motion.fps)
-    assert placement(motion, body_points(motion, body))["heading"] == 0.0
-    assert abs(placement(turned, body_points(turned, body))["heading"]) == pytest.approx(np.pi, abs=1e-3)
+    assert placement(motion, shape_points(motion, shape))["heading"] == 0.0
+    assert abs(placement(turned, shape_points(turned, shape))["heading"]) == pytest.approx(np.pi, abs=1e-3)
 
 
 @pytest.mark.parametrize("path", ["zeggs/067_Speech_2_x_1_0.bvh", "beat/2_scott_0_1_1.bvh"])
@@ -114,12 +114,12 @@ def test_real_rigs_with_fingers(shared, path):
     from a2g_jax.io.bvh import read_bvh
 
     motion = read_bvh(shared / path).clip(0, 40)
-    body = build_body(motion.skeleton)
+    shape = build_shape(motion.skeleton)
     assert find_roles(motion.skeleton) is not None
     # All ten fingers, thin; nothing like a balloon.
-    fingers = [shape for shape in body.shapes if shape.start_radius < 0.013]
+    fingers = [cone for cone in shape.cones if cone.start_radius < 0.013]
     assert len(fingers) >= 28
-    assert max(max(shape.start_radius, shape.end_radius) for shape in body.shapes) < 0.17
-    place = placement(motion, body_points(motion, body))
+    assert max(max(cone.start_radius, cone.end_radius) for cone in shape.cones) < 0.17
+    place = placement(motion, shape_points(motion, shape))
     assert 1.4 < place["height"] < 2.4
     assert abs(place["heading"]) < 0.61 or place["heading"] != 0.0

@@ -1,9 +1,9 @@
-"""Finding the body in rigs by their names."""
+"""Finding the body joints of rigs by their names."""
 
 import numpy as np
 import pytest
 
-from a2g_jax.geometry.body_joints import find_body
+from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 from a2g_jax.io.bvh import read_bvh
 
@@ -36,7 +36,7 @@ EXPECTED += ["LeftArm", "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "
 
 
 def found_names(skeleton):
-    joints = find_body(skeleton)
+    joints = find_body_joints(skeleton)
     return None if joints is None else [skeleton.names[joint] for joint in joints]
 
 
@@ -54,7 +54,7 @@ def test_prefixes(prefix):
 def test_case_and_separators_do_not_matter():
     plain = humanoid()
     names = tuple(name.replace("Left", "left_").lower() for name in plain.names)
-    assert find_body(Skeleton(plain.offsets, names, plain.parents)) == find_body(plain)
+    assert find_body_joints(Skeleton(plain.offsets, names, plain.parents)) == find_body_joints(plain)
 
 
 @pytest.mark.parametrize(("spines", "middle"), [(3, "Spine1"), (4, "Spine2"), (5, "Spine2"), (6, "Spine3")])
@@ -74,7 +74,7 @@ def test_spines_are_counted(spines, middle):
 def test_smplx_names(rename):
     order = list(range(22))
     skeleton = Skeleton(np.zeros((22, 3), np.float32), tuple(map(rename, BODY_JOINTS)), BODY_PARENTS)
-    assert find_body(skeleton) == tuple(order)
+    assert find_body_joints(skeleton) == tuple(order)
 
 
 def test_smplx_with_other_joints_in_between():
@@ -88,7 +88,7 @@ def test_smplx_with_other_joints_in_between():
         + [("Jaw", "Head")]
     )
     assert len(names) + 1 == skeleton.joints
-    assert find_body(skeleton) == tuple(range(1, 23))
+    assert find_body_joints(skeleton) == tuple(range(1, 23))
 
 
 def test_unreal_names():
@@ -113,28 +113,28 @@ def test_a_missing_joint(missing):
     if missing == "Spine3":
         assert found_names(skeleton)[9] == "Thing"
     else:
-        assert find_body(skeleton) is None
+        assert find_body_joints(skeleton) is None
 
 
 def test_too_few_spines():
-    assert find_body(humanoid(spines=2)) is None
+    assert find_body_joints(humanoid(spines=2)) is None
 
 
 def test_a_tree_that_contradicts_its_names():
     plain = humanoid()
     parents = list(plain.parents)
     parents[plain.index("LeftHand")] = plain.index("Head")
-    assert find_body(Skeleton(plain.offsets, plain.names, tuple(parents))) is None
+    assert find_body_joints(Skeleton(plain.offsets, plain.names, tuple(parents))) is None
 
 
 def test_no_body_at_all():
-    assert find_body(rig([("a", None), ("b", "a")])) is None
+    assert find_body_joints(rig([("a", None), ("b", "a")])) is None
 
 
 @pytest.mark.parametrize("name", ["zeggs/067_Speech_2_x_1_0.bvh", "beat/2_scott_0_1_1.bvh"])
 def test_real_rigs(shared, name):
     motion = read_bvh(shared / name)
-    joints = find_body(motion.skeleton)
+    joints = find_body_joints(motion.skeleton)
     assert [motion.skeleton.names[joint] for joint in joints] == EXPECTED
     # The names and the geometry agree: the left hand is on the left of an upright body at rest.
     rest = motion.positions()[:, list(joints)].mean(axis=0)

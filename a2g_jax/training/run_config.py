@@ -1,0 +1,155 @@
+"""The description of a run, and a trained model with it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from jaxtyping import Array, Float
+
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.geometry.pose_space import PoseSpace
+from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.models.base import Data, Model, Params, Summary
+from a2g_jax.models.entry import Entry
+from a2g_jax.models.registry import find_model
+from a2g_jax.models.train_config import TrainConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Perceptual:
+    """The frozen feature network of a perceptual loss."""
+
+    fingerprint: str
+    """SHA-256 of its weights."""
+    features: Callable[[Float[Array, "B T R D"]], list[Float[Array, "B T _"]]] | None = None
+    """Poses (B, T, R, D) to features of each block (B, T, width), differentiable; None in a finished run, since only
+    training needs them."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunConfig:
+    """The description of a run: everything but its weights."""
+
+    model: str
+    preset: str
+    model_config: Any
+    train_config: TrainConfig
+    fps: float
+    mel: MelConfig
+    space: PoseSpace
+    """The body, and the kind of numbers that its poses are written in."""
+    statistics: dict[str, Statistics]
+    """``audio``, ``pose`` and ``root`` of the corpus's training split."""
+    corpus: dict[str, Any]
+    """Fingerprint, recipe, length, emotions and speakers of the corpus."""
+    perceptual: Perceptual | None = None
+    """The feature network of a perceptual loss."""
+    sampling: Any = None
+    """Sampling settings; None for those of the preset."""
+
+    @property
+    def entry(self) -> Entry:
+        """The model's registry entry."""
+        return find_model(self.model)
+
+    @property
+    def sampling_settings(self) -> Any:
+        """Sampling settings."""
+        return self.entry.sampling_preset(self.preset) if self.sampling is None else self.sampling
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The skeleton of the generated motion.
+
+        Raises:
+            InputError: the model generates keypoints or directions.
+        """
+        if not self.space.has_rotations:
+            raise InputError(
+                f"the run of {self.model} was trained on {self.space.noun}, which have no skeleton to animate; train on"
+                " a corpus of rotations (a2g prepare --pose 6d), or score it with 'a2g evaluate'."
+            )
+        return self.space.skeleton
+
+    @classmethod
+    def of(
+        cls,
+        model: str,
+        preset: str,
+        model_config: Any,
+        train_config: TrainConfig,
+        corpus: Corpus,
+        perceptual: Perceptual | None = None,
+    ) -> "RunConfig":
+        """The description of a run of a model on a corpus.
+
+        Raises:
+            InputError: the model does not take the corpus's kind of poses.
+        """
+        if poses := find_model(model).poses:
+            corpus.require_pose(*poses)
+        about = {
+            "fingerprint": corpus.fingerprint,
+            "recipe": corpus.recipe,
+            "seconds": corpus.frames / corpus.fps,
+            "emotions": list(corpus.emotions),
+            "speakers": list(corpus.speakers),
+        }
+        return cls(
+            model=model,
+            preset=preset,
+            model_config=model_config,
+            train_config=train_config,
+            fps=corpus.fps,
+            mel=corpus.mel,
+            space=corpus.space,
+            statistics=corpus.statistics,
+            corpus=about,
+            perceptual=perceptual,
+        )
+
+    def data(self) -> Data:
+        """The properties of the corpus that the model is built for."""
+        return Data(
+            self.space,
+            self.fps,
+            self.mel.width,
+            self.statistics["pose"],
+            tuple(self.corpus.get("emotions", ())),
+            tuple(self.corpus.get("speakers", ())),
+            None if self.perceptual is None else self.perceptual.features,
+            self.mel.sample_rate,
+        )
+
+    def build(self) -> Model:
+        """The model's functions."""
+        model: Model = self.entry.builder()(self.model_config, self.data(), self.sampling_settings)
+        return model
+
+    def with_sampling(self, **changes: Any) -> "RunConfig":
+        """The run with other sampling settings.
+
+        Raises:
+            InputError: a setting that the model does not have, or a value out of range.
+        """
+        names = [field.name for field in fields(self.sampling_settings)]
+        for name in changes:
+            if name not in names:
+                raise InputError(
+                    f"{self.model}: has no sampling setting {name!r}; it has: {', '.join(names) or 'none'}."
+                )
+        return replace(self, sampling=replace(self.sampling_settings, **changes))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A trained model: description, parameters and latent summary."""
+
+    config: RunConfig
+    params: Params
+    summary: Summary
+    steps: int
+    """Training steps of the weights."""
