@@ -16,7 +16,7 @@ _EXPORTS = {
     "LatentSpace": "a2g_jax.generation.audio2gestures.latent_space",
     "Motion": "a2g_jax.geometry.motion",
     "PoseSpace": "a2g_jax.geometry.pose_space",
-    "Recording": "a2g_jax.data.recording",
+    "Recording": "a2g_jax.recording",
     "Run": "a2g_jax.training.run",
     "RunConfig": "a2g_jax.training.run",
     "Skeleton": "a2g_jax.geometry.skeleton",

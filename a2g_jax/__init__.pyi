@@ -1,6 +1,5 @@
 from a2g_jax.compilations import keep_compilations as keep_compilations
 from a2g_jax.data.corpus import Corpus as Corpus
-from a2g_jax.data.recording import Recording as Recording
 from a2g_jax.errors import InputError as InputError
 from a2g_jax.evaluation.evaluate import evaluate as evaluate
 from a2g_jax.features.mel import log_mel as log_mel
@@ -24,6 +23,7 @@ from a2g_jax.io.bvh_writer import write_bvh as write_bvh
 from a2g_jax.io.npz import read_motion_npz as read_motion_npz
 from a2g_jax.io.npz import write_motion_npz as write_motion_npz
 from a2g_jax.models.registry import find_model as find_model
+from a2g_jax.recording import Recording as Recording
 from a2g_jax.talker.recordings import resample_motion as resample_motion
 from a2g_jax.talker.recordings import talk as talk
 from a2g_jax.training.loop import train as train

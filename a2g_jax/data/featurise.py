@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int16
 
-from a2g_jax.data.recording import PoseRecording, Recording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
@@ -15,6 +14,7 @@ from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack, represent, resample_track
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_skeleton
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.recording import PoseRecording, Recording
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,11 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.textgrid import read_words
+from a2g_jax.recording import Recording
 
 AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".mp3")
 

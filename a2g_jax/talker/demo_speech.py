@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from a2g_jax.data.recording import Recording
+from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import talk
 
 #: Arguments of :func:`~a2g_jax.talker.recordings.talk`; no training corpus uses this seed.

@@ -17,9 +17,9 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.recording import Recording
 from a2g_jax.talker.hidden_choices import speech_plan
 from a2g_jax.talker.recordings import resample_motion
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Recording
 from a2g_jax.talker.gesture_plan import (
     FAMILY_CHANGE,
     accented_syllables,

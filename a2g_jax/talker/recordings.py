@@ -7,9 +7,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from a2g_jax.data.recording import Recording, Word
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.recording import Recording, Word
 from a2g_jax.talker.augment import augment
 from a2g_jax.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.talker.gestures import gesticulate

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speech_envelope, speed_peaks, wrist_speed
+from a2g_jax.recording import Recording
 from a2g_jax.talker.expectation import Estimate, bounds, expected_multimodality
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS

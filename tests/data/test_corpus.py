@@ -10,13 +10,13 @@ import pytest
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.folder import find_pairs, read_pair
-from a2g_jax.data.recording import Recording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import talk
 
 FEATURES = Features(joints="all")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import talk
 
 RATE = 16000

@@ -12,7 +12,6 @@ from recordings_for_tests import CAST, clean, codes, long_talk, write_pair
 
 from a2g_jax.data.corpus_layout import MANIFEST
 from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
-from a2g_jax.data.recording import PoseRecording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
@@ -21,6 +20,7 @@ from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.rigs import check_skeletons
 from a2g_jax.io.bvh import write_bvh
+from a2g_jax.recording import PoseRecording
 from a2g_jax.training.run import Run, save_run
 
 DEMO = Path(__file__).parents[2] / "a2g_jax" / "demo"

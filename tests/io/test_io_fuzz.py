@@ -9,7 +9,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
@@ -18,6 +17,7 @@ from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.io.files import read_json, write_json
 from a2g_jax.io.npz import read_motion_npz, write_motion_npz
 from a2g_jax.io.textgrid import read_words, write_words
+from a2g_jax.recording import Word
 
 EXAMPLES = 100
 

@@ -2,9 +2,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.io.textgrid import read_words, write_words
+from a2g_jax.recording import Word
 
 WORDS = (Word("hello", 0.25, 0.5), Word('"world"', 0.5, 1.0), Word("ünï, ! [1] xmin = 3", 1.5, 2.0))
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Word
 from a2g_jax.viz.player import Figure, Track, screenshot_page, write_page
 from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
 from tests.viz.figures_for_tests import tone, waving

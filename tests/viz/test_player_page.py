@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Word
 from a2g_jax.viz.player import Figure, Track, write_page
 from a2g_jax.viz.player.encode import decode_positions, encode_positions
 from a2g_jax.viz.player.page import fill_template, script_json

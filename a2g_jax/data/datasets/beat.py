@@ -12,11 +12,11 @@ from a2g_jax.data.datasets.beat_take import LANGUAGES, describe_face, emotion, r
 from a2g_jax.data.datasets.cut import cut
 from a2g_jax.data.datasets.named_files import files_by_name, list_files, require
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.textgrid import read_words
+from a2g_jax.recording import Recording
 
 _EXPECTED = (
     "the folder beat_english_v0.2.1 (or of another language), which holds <speaker>/<take>.bvh with .wav and "

@@ -24,11 +24,11 @@ from a2g_jax.data.datasets.csv_tables import read_columns
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, unique_names
 from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.textgrid import read_words
 from a2g_jax.io.untrusted import read_npz
+from a2g_jax.recording import Recording
 
 FPS = 30.0
 _POSES, _SPLIT = "smplxflame_30", "train_test_split.csv"

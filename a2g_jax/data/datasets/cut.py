@@ -3,8 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
-from a2g_jax.data.recording import Recording, Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Recording, Word
 
 
 def cut(recording: Recording, start: float, end: float | None = None) -> Recording:

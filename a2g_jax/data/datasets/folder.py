@@ -4,7 +4,7 @@ from pathlib import Path
 
 from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.data.folder import find_pairs, read_pair
-from a2g_jax.data.recording import Recording
+from a2g_jax.recording import Recording
 
 
 def find(folder: Path) -> list[Take]:

@@ -36,10 +36,10 @@ from a2g_jax.data.datasets.layouts import S2G_LAYOUT
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, table_rows, unique_names
 from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.untrusted import Limits, read_npz
+from a2g_jax.recording import PoseRecording
 
 FPS = 15.0
 AUDIO_RATE = 16000

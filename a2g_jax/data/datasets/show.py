@@ -26,10 +26,10 @@ import numpy as np
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, files_with, unique_names
 from a2g_jax.data.datasets.smplx import float_array, smplx_motion
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.untrusted import read_pickle
+from a2g_jax.recording import Recording
 from a2g_jax.talker.skeleton import PELVIS_HEIGHT
 
 FPS = 30.0

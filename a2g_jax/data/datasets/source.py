@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.data.recording import PoseRecording, Recording
+from a2g_jax.recording import PoseRecording, Recording
 
 #: Parts of an official split.
 SPLITS = ("train", "validation", "test")

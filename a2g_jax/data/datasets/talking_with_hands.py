@@ -15,11 +15,11 @@ from typing import NamedTuple
 from a2g_jax.data.datasets.csv_tables import read_cells
 from a2g_jax.data.datasets.named_files import NamedFiles, files_by_name, list_files, require, without_motion
 from a2g_jax.data.datasets.source import Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.transcripts import read_transcript
+from a2g_jax.recording import Recording
 
 _SPLITS = {"trn": "train", "val": "validation", "tst": "test"}
 _SUFFIXES = (".bvh", ".wav", ".tsv")

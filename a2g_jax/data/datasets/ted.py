@@ -11,8 +11,8 @@ from a2g_jax.data.datasets.layouts import TED_LAYOUT
 from a2g_jax.data.datasets.lookup import check_folder
 from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.data.datasets.ted_lmdb import databases, find_clips, read_clip
-from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
+from a2g_jax.recording import PoseRecording
 
 _EXPECTED = "TED Gesture's, with lmdb_train, lmdb_val and lmdb_test (each with a data.mdb) in it"
 

@@ -21,10 +21,10 @@ from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.smplx import float_array
 from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.data.datasets.ted_lmdb import databases, find_clips, read_clip
-from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.untrusted import Limits, read_npz
+from a2g_jax.recording import PoseRecording
 
 FPS = 15.0
 _EXPECTED = (

@@ -31,12 +31,12 @@ from a2g_jax.data.datasets.lookup import SPLIT_NAMES, unique_names
 from a2g_jax.data.datasets.samples import speech_samples
 from a2g_jax.data.datasets.smplx import float_array
 from a2g_jax.data.datasets.source import Take
-from a2g_jax.data.recording import PoseRecording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.untrusted import Limits, LmdbFile, decode_arrow
 from a2g_jax.io.words import Word
+from a2g_jax.recording import PoseRecording
 
 AUDIO_RATE = 16000
 #: Limit on the memory of one video: an hour with poses, speech and mels takes about 400 MB.

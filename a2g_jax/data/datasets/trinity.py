@@ -10,11 +10,11 @@ from pathlib import Path
 
 from a2g_jax.data.datasets.named_files import files_by_name, list_files, require, without_motion
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.transcripts import read_transcript
+from a2g_jax.recording import Recording
 
 _EXPECTED = (
     "the folder GENEA_Challenge_2020_data_release, which holds Training_data and Test_data with Audio, Motion and "

@@ -12,10 +12,10 @@ from a2g_jax.data.datasets import zeroeggs_original
 from a2g_jax.data.datasets.csv_tables import read_columns
 from a2g_jax.data.datasets.named_files import NamedFiles, files_by_name, list_files, require
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
+from a2g_jax.recording import Recording
 
 _EXPECTED = "the folder data of ZeroEGGS, which holds info.csv with clean or original, or one of these two"
 _ORIGINAL = re.compile(r"[0-9]{3}_([A-Za-z]+)_[0-9]+(_mirror)?")

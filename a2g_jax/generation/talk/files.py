@@ -8,7 +8,6 @@ from typing import Any
 import jax
 
 from a2g_jax import __version__
-from a2g_jax.data.recording import Recording
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
 from a2g_jax.generation.talk.page import write_talk_page
 from a2g_jax.generation.talk.request import TalkRequest, truth_from_json
@@ -16,6 +15,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.files import write_json
 from a2g_jax.io.textgrid import write_words
+from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import plan_from_json, resample_motion
 from a2g_jax.talker.styles import gesture_style
 from a2g_jax.talker.transcript import speech_tiers

@@ -6,9 +6,9 @@ from typing import Any
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_layout import Entry
-from a2g_jax.data.recording import Recording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.truth import GestureTruth, GestureUnit, PhaseSpan, Stroke
 from a2g_jax.talker.views.upper_body import upper_body

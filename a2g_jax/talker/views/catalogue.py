@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from a2g_jax.data.recording import PoseRecording, Recording
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack
+from a2g_jax.recording import PoseRecording, Recording
 from a2g_jax.talker.views.directions import TED, TED_EXPRESSIVE, BoneLayout, directions
 from a2g_jax.talker.views.keypoints import KEYPOINT_BONES, KEYPOINTS, keypoints
 from a2g_jax.talker.views.upper_body import upper_body_recording

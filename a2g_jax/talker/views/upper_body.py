@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.data.recording import Recording
 from a2g_jax.geometry.motion import Motion, resample
 from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.recording import Recording
 from a2g_jax.talker.views.landmarks import require_fingers
 
 _FINGERS = {"M": "Middle", "R": "Ring", "P": "Pinky", "I": "Index", "T": "Thumb"}

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from a2g_jax.data.datasets import beat
 from a2g_jax.data.datasets.beat_split import Part, parts
 from a2g_jax.data.datasets.beat_take import describe_face, emotion, read_emotions, read_semantics
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
 from a2g_jax.io.textgrid import write_words
+from a2g_jax.recording import Word
 
 WORDS = (Word("the", 0.25, 0.5), Word("first", 0.5, 1.0), Word("thing", 1.25, 1.75))
 PHONES = (Word("DH", 0.25, 0.3), Word("AH0", 0.3, 0.5), Word("F", 0.5, 1.0))

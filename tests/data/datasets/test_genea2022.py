@@ -2,8 +2,8 @@ import pytest
 from bvh_trees import check_motion, check_sound, put, write_motion, write_sound
 
 from a2g_jax.data.datasets import genea2022
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Word
 
 TSV = "0.2\t0.55\tYeah.\r\n0.55\t1.319\tI am\r\n1.5\t1.75\t#laughter\r\n"
 WORDS = (Word("Yeah.", 0.2, 0.55), Word("I am", 0.55, 1.319), Word("#laughter", 1.5, 1.75))

@@ -2,8 +2,8 @@ import pytest
 from bvh_trees import check_motion, check_sound, put, write_motion, write_sound
 
 from a2g_jax.data.datasets import genea2023
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Word
 
 HEADER = "prefix,main-agent_id,main-agent_has_fingers,interloctr_id,interloctr_has_fingers\n"
 ROWS = {

@@ -5,8 +5,8 @@ import pytest
 from bvh_trees import check_motion, put, write_motion, write_sound
 
 from a2g_jax.data.datasets import trinity
-from a2g_jax.data.recording import Word
 from a2g_jax.errors import InputError
+from a2g_jax.recording import Word
 
 WORDS = (Word("so", 0.4, 0.9), Word("hello", 0.9, 1.5))
 
