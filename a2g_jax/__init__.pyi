@@ -27,11 +27,11 @@ from a2g_jax.recording import Recording as Recording
 from a2g_jax.talker.recordings import resample_motion as resample_motion
 from a2g_jax.talker.recordings import talk as talk
 from a2g_jax.training.loop import train as train
-from a2g_jax.training.run import Run as Run
-from a2g_jax.training.run import RunConfig as RunConfig
 from a2g_jax.training.run import demo_run as demo_run
 from a2g_jax.training.run import load_run as load_run
 from a2g_jax.training.run import open_run as open_run
+from a2g_jax.training.run_config import Run as Run
+from a2g_jax.training.run_config import RunConfig as RunConfig
 from a2g_jax.viz.player.figure import Figure as Figure
 from a2g_jax.viz.player.page import write_page as write_page
 

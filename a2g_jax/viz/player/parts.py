@@ -6,6 +6,7 @@ proportions and the rest pose is decided in :mod:`~a2g_jax.viz.player.shape`.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -66,6 +67,6 @@ class Shape:
         self.cones.append(Cone(start, end, radii[0], radii[1], **more))
 
 
-def short(numbers: Iterable[float]) -> list:
+def short(numbers: Iterable[Any]) -> list[Any]:
     """Numbers for compact JSON: whole ones as integers, others with five decimals."""
     return [int(number) if float(number).is_integer() else round(float(number), 5) for number in numbers]
