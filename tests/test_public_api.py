@@ -8,6 +8,7 @@ import pytest
 import a2g_jax
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("name", a2g_jax.__all__)
 def test_every_name_is_there(name):
     assert getattr(a2g_jax, name) is not None

@@ -32,7 +32,7 @@ def small_window():
     module.WINDOW = before
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def generator(toy_run_config, toy_corpus, small_window):
     config = toy_run_config()
     config = dataclasses.replace(config, model_config=dataclasses.replace(config.model_config, redraw_frames=32))
