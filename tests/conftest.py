@@ -1,12 +1,17 @@
 """What every test shares: strict JAX, two devices, keys, and the real recordings where they are."""
 
 import os
+from importlib.metadata import version
 from pathlib import Path
 
-# Before JAX starts: two virtual devices find sharding mistakes, and one compilation cache serves the whole session.
-os.environ.setdefault("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
+# Before JAX starts. Two virtual devices find sharding mistakes. Compilation is most of the time of the suite: compiled
+# quickly rather than well, programs take a tenth of it. XLA aborts on unknown flags, and JAX 0.12 lacks the last one.
+_FLAGS = ["--xla_force_host_platform_device_count=2", "--xla_backend_optimization_level=0"]
+if version("jaxlib").startswith("0.10."):
+    _FLAGS += ["--xla_cpu_parallel_codegen_split_count=1", "--xla_cpu_use_fusion_emitters=false"]
+os.environ.setdefault("XLA_FLAGS", " ".join(_FLAGS))
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-# Each training is a new function to JAX though the program is the same: compile it once, for subprocesses too.
+# One compilation cache serves the session: each training is a new function to JAX though the program is the same.
 _CACHE = Path(__file__).parents[1] / ".cache" / "jax"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_CACHE))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
@@ -74,7 +79,7 @@ TOY_MODEL = {
 }
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def toy_run_config(toy_corpus):
     """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings."""
     import dataclasses

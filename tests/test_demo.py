@@ -1,6 +1,7 @@
 """The shipped weights: there, trained on generated data alone, and listening."""
 
 import numpy as np
+import pytest
 
 from a2g_jax.cli import main
 from a2g_jax.generation.generator import Generator
@@ -17,6 +18,14 @@ def test_demo_writes_motions_and_a_page(tmp_path, capsys):
     motions = [read_bvh(path) for path in sorted((tmp_path / "demo").glob("*.bvh"))]
     assert [motion.frames for motion in motions] == [600, 600, 600]
     assert np.abs(motions[0].positions() - motions[1].positions()).max() > 0.05
+
+
+@pytest.mark.smoke
+def test_two_seconds_of_speech():
+    first, second = Generator(demo_run()).generate(talk(2.0, 5).audio, 2, seed=0)
+    assert first.frames == 60
+    assert np.isfinite(first.positions()).all()
+    assert np.abs(first.rotations - second.rotations).max() > 1e-3
 
 
 def test_no_recording_went_into_the_weights():

@@ -10,6 +10,7 @@ import pytest
 import a2g_jax
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("name", [name for name in a2g_jax.__all__ if name != "__version__"])
 def test_every_name_is_there_and_documented(name):
     value = getattr(a2g_jax, name)

@@ -38,12 +38,12 @@ def folders(tmp_path_factory):
     return path
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def corpus(folders):
     return Corpus.open(folders / "corpus")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def config(corpus, toy_run_config):
     def make(**changes):
         toy = toy_run_config(**{"steps": 24, "part_steps": 5, **changes})
@@ -85,8 +85,15 @@ def test_training_takes_the_parts_in_turns(corpus):
     assert [stream.number(step) for step in (0, 4, 5, 9, 10, 14, 15, 20)] == [0, 0, 1, 1, 2, 2, 0, 1]
 
 
-def test_resuming_equals_not_having_stopped(tmp_path, corpus, config, monkeypatch):
-    whole = train(config(), corpus, tmp_path / "whole", resume=False, progress=False)
+@pytest.fixture(scope="module")
+def whole(corpus, config, tmp_path_factory):
+    """A training without a stop, and its folder."""
+    path = tmp_path_factory.mktemp("on_demand_run") / "whole"
+    return train(config(), corpus, path, resume=False, progress=False), path
+
+
+def test_resuming_equals_not_having_stopped(tmp_path, corpus, config, whole, monkeypatch):
+    whole, path = whole
     original = loop.MetricsLog.tick
 
     def tick(self, done):
@@ -101,13 +108,16 @@ def test_resuming_equals_not_having_stopped(tmp_path, corpus, config, monkeypatc
     resumed = train(config(), corpus, tmp_path / "half", resume=True, progress=False)
     jax.tree.map(np.testing.assert_array_equal, whole.params, resumed.params)
     jax.tree.map(np.testing.assert_array_equal, whole.summary, resumed.summary)
-    text = (tmp_path / "whole" / "metrics.jsonl").read_text()
-    assert (tmp_path / "half" / "metrics.jsonl").read_text() == text
-    # The parts matter: training on the stored one alone ends elsewhere.
+    assert (tmp_path / "half" / "metrics.jsonl").read_text() == (path / "metrics.jsonl").read_text()
+
+
+def test_the_parts_matter(tmp_path, corpus, config, whole):
+    """Training on the stored part alone ends elsewhere."""
+    whole, path = whole
     alone = train(config(part_steps=1000), corpus, tmp_path / "alone", resume=False, progress=False)
     assert not np.array_equal(jax.tree.leaves(alone.params)[0], jax.tree.leaves(whole.params)[0])
     with pytest.raises(InputError, match="part_steps: 5, now 7"):
-        train(config(steps=30, part_steps=7), corpus, tmp_path / "whole", resume=True, progress=False)
+        train(config(steps=30, part_steps=7), corpus, path, resume=True, progress=False)
 
 
 def test_an_ordinary_corpus_does_not_care_for_part_steps(tmp_path, toy_corpus, toy_run_config):

@@ -17,6 +17,7 @@ def speech_like(seconds, seed=0, rate=16000):
     return (0.2 * bursts * random.normal(size=len(time)) + 0.02 * np.sin(2 * np.pi * 150 * time)).astype(np.float32)
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(("hop", "bands", "window"), [(512, 64, 2048), (640, 40, 1024)])
 def test_equals_librosa_where_the_hop_is_whole(hop, bands, window):
     audio = speech_like(3)

@@ -20,7 +20,7 @@ from a2g_jax.training.validation import collect_summary
 _SPEECH = talk(6.0, 21).audio
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def generator(toy_run_config, toy_corpus):
     """Windows of 128 frames, so that short audio already has several."""
     config = toy_run_config()

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jax.test_util import check_grads
@@ -50,6 +51,7 @@ def test_random_trees(parents, seed):
     np.testing.assert_allclose(places, expected[:, :3, 3], atol=5e-6)
 
 
+@pytest.mark.smoke
 def test_the_body():
     rotations, offsets = random_frames(22, frames=6)
     expected = np.stack([reference(frame, offsets, BODY_PARENTS)[:, :3, 3] for frame in rotations])

@@ -58,6 +58,7 @@ def again(motion: Motion, path, **options) -> Motion:
     return Motion(rotations=result.rotations[:, back], root=result.root, skeleton=skeleton, fps=result.fps)
 
 
+@pytest.mark.smoke
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

@@ -17,8 +17,8 @@ def test_there_are_notebooks():
     assert {"latent_dct_edits", "audio2gestures_tour", "stylized_flow_tour"} <= {path.stem for path in NOTEBOOKS}
 
 
-#: Seconds that a cell may take; they take a few.
-PATIENCE = 130
+#: Seconds that a cell may take; they take a few on a quiet machine.
+PATIENCE = 300
 
 
 def executed(path, folder, stacks):
@@ -37,7 +37,6 @@ def executed(path, folder, stacks):
     return notebook
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
 def test_runs(path, tmp_path):
     folder, stacks = tmp_path / "work", tmp_path / "stacks.txt"

@@ -8,6 +8,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.talker.recordings import cast, plan_from_json, resample_motion, talk
 
 
+@pytest.mark.smoke
 def test_the_same_arguments_give_the_same_recording():
     first, second = talk(5.0, 11), talk(5.0, 11)
     np.testing.assert_array_equal(first.audio, second.audio)

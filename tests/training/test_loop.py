@@ -46,6 +46,7 @@ def test_training_lowers_the_loss_and_writes_the_run(tmp_path, toy_corpus, toy_r
     assert len(again.summary["specific_mean"]) > 20
 
 
+@pytest.mark.smoke
 def test_resuming_equals_not_having_stopped(tmp_path, toy_corpus, toy_run_config):
     whole = train(toy_run_config(), toy_corpus, tmp_path / "whole", resume=False, progress=False)
     # Interrupted between two checkpoints.
@@ -126,17 +127,26 @@ def test_a_run_that_never_got_to_a_checkpoint_can_be_started_again(tmp_path, toy
     assert load_run(out).steps == 5
 
 
-def test_folders_that_cannot_be_used(tmp_path, toy_corpus, toy_run_config):
-    config = toy_run_config(steps=5)
+@pytest.fixture(scope="module")
+def five_steps(toy_corpus, toy_run_config, tmp_path_factory):
+    """The folder of a run of five steps, to be copied, and its configuration."""
+    folder = tmp_path_factory.mktemp("five_steps") / "run"
+    config = toy_run_config(steps=5, schedule="constant")
+    train(config, toy_corpus, folder, resume=False, progress=False)
+    return folder, config
+
+
+def test_folders_that_cannot_be_used(tmp_path, toy_corpus, toy_run_config, five_steps):
+    folder, config = five_steps
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="not empty and holds no run"):
         train(config, toy_corpus, tmp_path / "other", resume=False, progress=False)
-    train(config, toy_corpus, tmp_path / "run", resume=False, progress=False)
     with pytest.raises(InputError, match="holds a run already"):
-        train(config, toy_corpus, tmp_path / "run", resume=False, progress=False)
+        train(config, toy_corpus, folder, resume=False, progress=False)
+    changed = toy_run_config(steps=9, learning_rate=0.01, schedule="constant")
     with pytest.raises(InputError, match="learning_rate: 0.001, now 0.01"):
-        train(toy_run_config(steps=9, learning_rate=0.01), toy_corpus, tmp_path / "run", resume=True, progress=False)
+        train(changed, toy_corpus, folder, resume=True, progress=False)
 
 
 def test_clips_longer_than_recordings(tmp_path, toy_corpus, toy_run_config):
@@ -147,19 +157,19 @@ def test_clips_longer_than_recordings(tmp_path, toy_corpus, toy_run_config):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, toy_corpus, toy_run_config):
-    folder = tmp_path / "run"
-    train(toy_run_config(steps=5, schedule="constant"), toy_corpus, folder, resume=False, progress=False)
+def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, toy_corpus, five_steps):
+    original, config = five_steps
+    folder = shutil.copytree(original, tmp_path / "run")
     for file in (folder / "checkpoints" / "5").rglob("*"):
         if file.is_file():
             file.write_bytes(b"\x80\x04nothing to see here")
     with pytest.raises(InputError, match="checkpoints/5: cannot be resumed from"):
-        train(toy_run_config(steps=5, schedule="constant"), toy_corpus, folder, resume=True, progress=False)
+        train(config, toy_corpus, folder, resume=True, progress=False)
 
 
-def test_damaged_runs(tmp_path, toy_corpus, toy_run_config):
-    folder = tmp_path / "run"
-    run = train(toy_run_config(steps=5), toy_corpus, folder, resume=False, progress=False)
+def test_damaged_runs(tmp_path, five_steps):
+    folder = shutil.copytree(five_steps[0], tmp_path / "run")
+    run = load_run(folder)
     weights = (folder / "weights.safetensors").read_bytes()
     for broken in (weights[: len(weights) // 2], b"", b"\x80\x04pickle", weights[:8] + b"x" * 100):
         (folder / "weights.safetensors").write_bytes(broken)
