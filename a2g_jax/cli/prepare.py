@@ -105,7 +105,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
     print(
         f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
-        f" {corpus.rows} {corpus.space.noun} at {corpus.fps:g} fps ("
+        f" {corpus.space.rows} {corpus.space.noun} at {corpus.fps:g} fps ("
         + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
         + ")"
     )

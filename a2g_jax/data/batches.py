@@ -27,7 +27,7 @@ class Crops(NamedTuple):
 
 
 def find_crops(corpus: Corpus, split: str, frames: int) -> Crops:
-    """Starts of all clips of ``frames`` frames that lie within one stretch of a split.
+    """Starts of all clips of a length within one stretch of a split.
 
     Raises:
         InputError: no stretch is that long.
@@ -36,11 +36,11 @@ def find_crops(corpus: Corpus, split: str, frames: int) -> Crops:
 
 
 def crops_in(segments: list[Segment], frames: int, longest: str) -> Crops:
-    """Starts of all clips of ``frames`` frames that lie within one of the stretches.
+    """Starts of all clips of a length within one of the stretches.
 
     Args:
         segments: stretches as rows of the arrays.
-        longest: what the longest stretch is, for the error.
+        longest: name of the longest stretch, for the error.
 
     Raises:
         InputError: no stretch is that long.
@@ -65,7 +65,7 @@ def draw_starts(key: Key[Array, ""], crops: Crops, batch_size: int) -> Int[Array
 
 @dataclass(frozen=True)
 class BatchMaker:
-    """From raw clips to the batch that a model is trained on."""
+    """Makes the batch that a model is trained on of raw clips."""
 
     audio_statistics: Statistics
     augmentation: float

@@ -165,11 +165,6 @@ class Corpus:
                 f" Prepare one with --pose {kinds[0]}."
             )
 
-    @property
-    def rows(self) -> int:
-        """Rows of a pose: joints, bones or points."""
-        return self.space.rows
-
     @cached_property
     def emotions(self) -> tuple[str, ...]:
         """Emotions of the corpus, including recordings to be generated, in alphabetical order."""

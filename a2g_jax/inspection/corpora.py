@@ -153,7 +153,7 @@ def corpus_facts(corpus: Corpus, rig: Rig | None) -> dict[str, Any]:
             "recordings": len(corpus.recordings),
             "minutes": round(corpus.frames / corpus.fps / 60, 2),
             "fps": corpus.fps,
-            "pose": f"{corpus.space.kind}, {corpus.rows} rows",
+            "pose": f"{corpus.space.kind}, {corpus.space.rows} rows",
             "audio": f"{corpus.mel.width} values a frame ({corpus.mel.bands} bands at {corpus.mel.sample_rate} Hz)",
             "fingerprint": corpus.fingerprint,
             "made by": {name: value for name, value in corpus.recipe.items() if name in ("reader", "source", "seed")},
