@@ -180,11 +180,8 @@ class Corpus:
     @cached_property
     def labels(self) -> Int32[np.ndarray, "N 2"]:
         """Indices into :attr:`emotions` and :attr:`speakers` of each row."""
-        return label_rows(
-            self.emotions,
-            self.speakers,
-            [(entry.emotion, entry.speaker, entry.frames) for entry in self.recordings],
-        )
+        recordings = [(entry.emotion, entry.speaker, entry.frames) for entry in self.recordings]
+        return label_rows(self.emotions, self.speakers, recordings)
 
     @property
     def parts(self) -> int:
