@@ -134,7 +134,7 @@ def test_a_recording_of_a_corpus(tmp_path, capsys):
 def test_errors_are_one_line_and_leave_nothing(tmp_path, monkeypatch, capsys, arguments, message):
     monkeypatch.chdir(tmp_path)
     if "600" in arguments:  # as long, without the computing
-        monkeypatch.setattr("a2g_jax.generation.talk.files._PAGE_LIMIT", 1000)
+        monkeypatch.setattr("a2g_jax.generation.formats._PAGE_LIMIT", 1000)
         arguments = ["--seconds", "4"]
     try:
         status = main(["talk", "--out", str(tmp_path / "out"), *arguments])

@@ -63,8 +63,8 @@ def test_parts_hold_the_rows_that_would_be_stored(folders, corpus):
         for number in (1, 2):
             part = parts.get(number)
             rows = slice(corpus.frames + 300 * (number - 1), corpus.frames + 300 * number)
-            np.testing.assert_array_equal(part.audio, stored.audio[rows])
-            np.testing.assert_array_equal(part.pose, stored.pose[rows])
+            np.testing.assert_array_equal(part.arrays["audio"], stored.audio[rows])
+            np.testing.assert_array_equal(part.arrays["pose"], stored.pose[rows])
             assert [tuple(segment) for segment in part.segments] == [(0, 0, 150), (1, 150, 300)]
             assert len(parts._coming) <= 1  # the next part at most
 
@@ -141,7 +141,7 @@ def test_stopping_while_a_part_is_waited_for(corpus):
     stop.set()
     with PartStream(corpus, part_steps=1, total_steps=3, workers=1) as parts:
         assert parts.get(1, stop) is None
-        assert parts.get(1).pose.shape == (300, 22, 6)
+        assert parts.get(1).arrays["pose"].shape == (300, 22, 6)
 
 
 def test_another_generator_is_refused(tmp_path, corpus):

@@ -105,7 +105,7 @@ def test_generated_talk_as_data_sets_show_it(tmp_path, capsys, view):
     if view == "beat":
         assert corpus.skeleton.joints == 47
         return
-    with pytest.raises(InputError, match="holds (directions|keypoints) and no skeleton"):
+    with pytest.raises(InputError, match="holds (bone directions|keypoints) and no skeleton"):
         _ = corpus.skeleton
     capsys.readouterr()
     if view != "s2g":

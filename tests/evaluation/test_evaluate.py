@@ -86,8 +86,8 @@ def test_noise_is_the_same_in_every_representation_of_rotations(corpus):
     pose = np.asarray(corpus.pose[:50])
     rotations = rotations_from_rows(pose, "6d")
     maps = np.asarray(axis_angle_from_matrix(jnp.asarray(rotations)))
-    noisy = candidates.with_noise(pose, 5.0, np.random.default_rng(0))
-    same = candidates.with_noise(maps, 5.0, np.random.default_rng(0), "exponential")
+    noisy = candidates.with_noise(corpus.space, pose, 5.0, np.random.default_rng(0))
+    same = candidates.with_noise(PoseSpace(corpus.body, "exponential"), maps, 5.0, np.random.default_rng(0))
     assert same.shape == maps.shape
     np.testing.assert_allclose(rotations_from_rows(same, "exponential"), rotations_from_rows(noisy, "6d"), atol=1e-4)
 
@@ -115,7 +115,7 @@ def test_other_right_motions_are_the_floor(result):
 
 def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config, network):
     config = dataclasses.replace(
-        toy_run_config(), body=corpus.body, statistics=corpus.statistics, corpus={"emotions": [], "speakers": []}
+        toy_run_config(), space=corpus.space, statistics=corpus.statistics, corpus={"emotions": [], "speakers": []}
     )
     import jax
 
@@ -264,7 +264,7 @@ def test_semantic_labels_are_weights_of_frames(corpus):
     spoilt = pose.copy()
     spoilt[100:] = pose[:1]
     assert scorer.sample(spoilt, target)["srgr"] == 1.0
-    spoilt[30:60] = candidates.with_noise(pose[30:60], 60.0, np.random.default_rng(0))
+    spoilt[30:60] = candidates.with_noise(corpus.space, pose[30:60], 60.0, np.random.default_rng(0))
     assert scorer.sample(spoilt, target)["srgr"] < 0.9
 
 

@@ -277,4 +277,4 @@ def test_bad_usage_from_the_command_line(files, tmp_path, capsys, monkeypatch, f
 def test_a_run_of_another_model_has_no_style(files, tmp_path, capsys):
     command = ["generate", "demo", "--audio", str(files / "speech.wav"), "--out", str(tmp_path / "out")]
     assert main([*command, "--style", str(files / "clip.bvh")]) == 2
-    assert "take a run of stylized_flow" in capsys.readouterr().err
+    assert "use a run of stylized_flow" in capsys.readouterr().err

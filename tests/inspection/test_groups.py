@@ -16,6 +16,7 @@ from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_layout import PoseLayout
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.rigs import check_skeletons
@@ -232,7 +233,7 @@ def test_run_without_a_skeleton(kind, rows, width, toy_run_config, tmp_path):
     layout = PoseLayout(("hip", "neck", "hand"), ((0, 1), (1, 2)), (0.5, 0.6) if kind == "directions" else ())
     config = toy_run_config()
     pose = Statistics(np.zeros((rows, width), np.float32), np.ones((rows, width), np.float32))
-    config = replace(config, body=layout, representation=kind, statistics={**config.statistics, "pose": pose})
+    config = replace(config, space=PoseSpace(layout, kind), statistics={**config.statistics, "pose": pose})
     code = np.ones((1, config.model_config.code_channels), np.float32)
     summary = {"specific_mean": code, "specific_std": code}
     save_run(tmp_path / "run", Run(config, config.build().init(jax.random.key(0)), summary, 30))

@@ -56,7 +56,7 @@ def make_density(networks: FlowNetworks) -> Density:
 
     def conditioning(
         audio: Float[Array, "B T bands"], pose: Float[Array, "B T R D"], clean: Float[Array, "B T R D"]
-    ) -> tuple[Float[Array, "B N D"], Float[Array, "B N C"]]:
+    ) -> tuple[Float[Array, "B N H"], Float[Array, "B N C"]]:
         """Pose history, audio window and style controls of the evaluated frames, and their z-scores."""
         flat = plain.flat(pose)
         given = plain.conditioning({}, audio, flat, controls=plain.controls(clean))
