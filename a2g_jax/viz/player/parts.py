@@ -66,6 +66,6 @@ class Shape:
         self.cones.append(Cone(start, end, radii[0], radii[1], **more))
 
 
-def short(numbers: Iterable[float]) -> list:
+def short(numbers: Iterable[float | int]) -> list:
     """Numbers for compact JSON: whole ones as integers, others with five decimals."""
     return [int(number) if float(number).is_integer() else round(float(number), 5) for number in numbers]
