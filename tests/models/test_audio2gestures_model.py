@@ -1,4 +1,4 @@
-"""The model as a whole: loss, gradients, schedules, and sampling that does not depend on windows."""
+"""The model as a whole: loss, schedules, and sampling that does not depend on windows."""
 
 from dataclasses import replace
 
@@ -7,71 +7,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from audio2gestures_for_tests import BANDS, CONFIG, DATA, JOINTS, MODEL, TERMS, make_batch, make_params
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
-from a2g_jax.features.statistics import Statistics
-from a2g_jax.geometry.pose_space import PoseSpace
-from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import find_model
 from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.audio2gestures.objective import weights as loss_weights
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
-from a2g_jax.models.base import Condition, Data
+from a2g_jax.models.base import Condition
 from a2g_jax.training.state import joint_loss
-
-CONFIG = replace(
-    PRESETS["tiny"],
-    audio_channels=(8,),
-    motion_channels=(8,),
-    decoder_channels=(8,),
-    head_channels=8,
-    code_channels=4,
-    clip_frames=6,
-    kl_ramp_steps=10,
-    alignment_ramp_steps=10,
-    diversity_decay_steps=20,
-    kl_shared_weight=0.01,
-    kl_specific_weight=0.02,
-    sampled_rotation_weight=0.5,
-    sampled_speed_weight=2.0,
-)
-BANDS, JOINTS = 5, 5
-SKELETON = Skeleton(
-    np.random.default_rng(0).normal(scale=0.3, size=(JOINTS, 3)).astype(np.float32), tuple("abcde"), (-1, 0, 1, 1, 3)
-)
-DATA = Data(
-    PoseSpace(SKELETON),
-    30.0,
-    BANDS,
-    Statistics(
-        np.random.default_rng(1).normal(size=(JOINTS, 6)).astype(np.float32), np.full((JOINTS, 6), 0.5, np.float32)
-    ),
-)
-MODEL = build(CONFIG, DATA)
-TERMS = ("rotation", "position", "speed", "alignment", "kl_shared", "kl_specific", "relaxed")
-TERMS += ("sampled_rotation", "sampled_speed", "bicycle", "diversity")
-
-
-def make_batch(dtype=np.float32, clips=2, frames=6):
-    random = np.random.default_rng(2)
-    turns = Rotation.random(clips * frames * JOINTS, rng=random).as_matrix()
-    pose = np.concatenate([turns[:, :, 0], turns[:, :, 1]], axis=1).reshape(clips, frames, JOINTS, 6)
-    return Batch(jnp.asarray(random.normal(size=(clips, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
-
-
-def make_params(dtype=np.float32, model=MODEL):
-    """Like ``init``, without the seconds that compiling its random numbers takes."""
-    random = np.random.default_rng(3)
-
-    def fill(leaf):
-        width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
-        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
-
-    return jax.tree.map(fill, jax.eval_shape(model.init, jax.random.key(0)))
 
 
 @pytest.fixture(scope="module")
@@ -145,78 +92,6 @@ def test_terms_of_weight_zero_cost_no_gradient(params, batch):
     assert convolutions(replace(CONFIG, bicycle_weight=0.0)) < convolutions(CONFIG)
 
 
-@pytest.fixture(scope="module")
-def double():
-    """A function in double precision: params to the gradient of any weighting of the terms, and the terms."""
-    with jax.enable_x64(True):
-        batch, params = make_batch(np.float64), make_params(np.float64)
-
-    def mixed(params, weights):
-        total, terms = joint_loss(MODEL.stages[0])(params, jax.random.key(0), batch, jnp.int32(7))
-        return sum(weights[name] * terms[name] for name in TERMS) + weights["total"] * total
-
-    return jax.jit(jax.value_and_grad(mixed)), params
-
-
-def unit(*names):
-    return {name: jnp.asarray(1.0 if name in names else 0.0) for name in (*TERMS, "total")}
-
-
-class TestGradient:
-    def test_every_parameter_gets_one(self, double, x64):
-        function, params = double
-        gradient = function(params, unit("total"))[1]
-        for path, leaf in jax.tree_util.tree_leaves_with_path(gradient):
-            assert np.isfinite(leaf).all(), path
-            assert np.abs(leaf).max() > 0, path
-
-    # Codes under stop_gradient (the noise's statistics, the bicycle's target) make differences and gradient disagree on
-    # purpose, so each network is checked on the terms that reach it by honest paths alone.
-    @pytest.mark.parametrize(
-        ("network", "terms"),
-        [
-            ("decoder", ("total",)),
-            ("audio_encoder", ("total",)),
-            ("mapping_net", tuple(name for name in TERMS if name != "bicycle")),
-            ("motion_encoder", ("rotation", "position", "speed", "alignment", "kl_shared")),
-        ],
-    )
-    def test_is_the_numerical_one(self, double, x64, network, terms):
-        function, params = double
-        weights = unit(*terms)
-        gradient = function(params, weights)[1][network]
-        random = np.random.default_rng(5)
-        way = jax.tree.map(lambda leaf: random.normal(size=leaf.shape), params[network])
-        step = 1e-6
-        ahead, behind = (
-            function(
-                params | {network: jax.tree.map(lambda p, w, s=sign: p + s * step * w, params[network], way)}, weights
-            )[0]
-            for sign in (1, -1)
-        )
-        expected = (ahead - behind) / (2 * step)
-        inner = sum(jax.tree.leaves(jax.tree.map(lambda g, w: np.sum(np.asarray(g) * w), gradient, way)))
-        assert abs(expected) > 1e-3
-        np.testing.assert_allclose(inner, expected, rtol=1e-5)
-
-    def test_bicycle_does_not_move_its_own_target(self, double, x64):
-        """Its gradient is that of the re-encoded motion: a bias at the mapping net's end also shifts the target."""
-        function, params = double
-        name = "GaussianHead_0"
-        gradient = function(params, unit("bicycle"))[1]["mapping_net"][name]["Dense_1"]["bias"]
-        step = 1e-6
-        differences = []
-        for channel in range(4):
-            ends = []
-            for sign in (1, -1):
-                moved = jax.tree.map(lambda x: x, params)
-                bias = moved["mapping_net"][name]["Dense_1"]["bias"]
-                moved["mapping_net"][name]["Dense_1"]["bias"] = bias.at[channel].add(sign * step)
-                ends.append(function(moved, unit("bicycle"))[0])
-            differences.append((ends[0] - ends[1]) / (2 * step))
-        assert np.abs(np.asarray(gradient) - np.asarray(differences)).max() > 1e-2
-
-
 def test_code_noise_has_the_statistics_of_each_clip_and_no_gradient():
     code = jnp.asarray(np.random.default_rng(0).normal([[[3.0, -5.0]], [[0.0, 1.0]]], [[[0.1, 2.0]]], (2, 4000, 2)))
     noise = np.asarray(code_noise(jax.random.key(0), code))
@@ -263,7 +138,7 @@ def test_reconstruct_and_summarise(params, batch):
     assert pose.shape == batch.pose.shape
     assert {name: array.shape for name, array in summary.items()} == {"specific_mean": (2, 4), "specific_std": (2, 4)}
     assert (summary["specific_std"] > 0).all()
-    # Clips do not see one another, and the audio plays no part.
+    # Clips do not affect one another, and the audio is not used.
     turned = Batch(2 * batch.audio, batch.pose[::-1])
     np.testing.assert_allclose(both(params, turned)[0], pose[::-1], atol=1e-6)
 
@@ -281,7 +156,7 @@ def test_init_gives_different_networks_for_different_keys():
     assert max(jax.tree.leaves(kernels)) > 0.1
 
 
-def test_dropout_is_on_in_training_alone(params, batch):
+def test_dropout_is_on_in_training_only(params, batch):
     """Counted in the traced program: compiling one with dropout takes long."""
     model = build(replace(CONFIG, dropout=0.5), DATA)
 

@@ -1,4 +1,4 @@
-"""Speech2Gesture: losses and gradients of both networks, windows, clips of any length, learning."""
+"""Speech2Gesture: losses of both networks, windows, clips of any length, learning."""
 
 from dataclasses import replace
 
@@ -7,71 +7,16 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 import pytest
+from speech2gesture_for_tests import BANDS, CONFIG, ROWS, make_batch, make_data, make_params, terms_of
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
-from a2g_jax.features.statistics import Statistics
-from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
-from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d
-from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models import find_model
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.models.speech2gesture.config import PRESETS
 from a2g_jax.models.speech2gesture.model import build
 from a2g_jax.models.speech2gesture.networks import translator_halo
-from a2g_jax.training.state import joint_loss
-
-CONFIG = replace(
-    PRESETS["tiny"],
-    audio_channels=(2, 2, 3, 3, 4, 4, 6, 6),
-    channels=6,
-    depth=2,
-    decoder_layers=1,
-    discriminator_channels=(4, 5, 6),
-    clip_frames=16,
-    value_speed_weight=0.5,
-    adversarial_weight=0.7,
-)
-BANDS, ROWS = 10, 4
-
-
-def make_data(representation="6d"):
-    random = np.random.default_rng(0)
-    shape = ROWS, WIDTHS[representation]
-    mean = np.zeros(shape) if representation == "exponential" else random.normal(size=shape)
-    statistics = Statistics(mean.astype(np.float32), random.uniform(0.3, 0.6, shape).astype(np.float32))
-    body = Skeleton(random.normal(scale=0.3, size=(ROWS, 3)).astype(np.float32), tuple("abcd"), (-1, 0, 1, 1))
-    if representation in ("keypoints", "directions"):
-        bones = tuple((0, end) for end in range(1, ROWS + (representation == "directions")))
-        body = PoseLayout(tuple("abcde"[: len(bones) + 1]), bones)
-    return Data(PoseSpace(body, representation), 30.0, BANDS, statistics)
-
-
-def make_batch(representation="6d", clips=2, frames=16, dtype=np.float32):
-    random = np.random.default_rng(2)
-    pose = random.normal(size=(clips, frames, ROWS, WIDTHS[representation]))
-    if representation == "exponential":
-        pose = np.asarray(axis_angle_from_matrix(matrix_from_6d(random.normal(size=(clips, frames, ROWS, 6)))))
-    return Batch(jnp.asarray(random.normal(size=(clips, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
-
-
-def make_params(model, dtype=np.float32):
-    """Like ``init``, without the seconds that compiling its random numbers takes; every bias and scale is drawn too."""
-    random = np.random.default_rng(3)
-
-    def fill(path, leaf):
-        if path[-1].key == "scale":
-            return jnp.asarray(random.uniform(0.5, 1.5, leaf.shape), dtype)
-        width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
-        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
-
-    return jax.tree_util.tree_map_with_path(fill, jax.eval_shape(model.init, jax.random.key(0)))
-
-
-def terms_of(model, params, batch):
-    return joint_loss(model.stages[0])(params, jax.random.key(0), batch, jnp.int32(0))
-
 
 EXPECTED = {
     "6d": {"rotation", "position", "speed"},
@@ -105,78 +50,6 @@ def test_terms_of_a_constant_discriminator():
     terms = jax.jit(lambda p: terms_of(model, p, make_batch("keypoints"))[1])(params | {"discriminator": silent})
     np.testing.assert_allclose(terms["adversarial"], 0.7**2, rtol=1e-5)
     np.testing.assert_allclose(terms["discriminator"], 0.7**2 + 0.3**2, rtol=1e-5)
-
-
-@pytest.fixture(scope="module")
-def sides():
-    """Gradients of the total, and of any one term, in double precision."""
-    with jax.enable_x64(True):
-        model = build(CONFIG, make_data())
-        params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
-    names = ("rotation", "position", "speed", "adversarial", "discriminator")
-
-    def mixed(params, weights):
-        total, terms = terms_of(model, params, batch)
-        return weights["total"] * total + sum(weights[name] * terms[name] for name in names)
-
-    function = jax.jit(jax.value_and_grad(mixed))
-    choose = lambda *chosen: {n: jnp.asarray(1.0 if n in chosen else 0.0) for n in (*names, "total")}  # noqa: E731
-    return function, params, choose
-
-
-class TestBothNetworks:
-    def test_the_discriminators_loss_does_not_move_the_translation_network(self, sides, x64):
-        function, params, choose = sides
-        gradient = function(params, choose("discriminator"))[1]
-        assert max(np.abs(leaf).max() for leaf in jax.tree.leaves(gradient["generator"])) == 0
-        for path, leaf in jax.tree_util.tree_leaves_with_path(gradient["discriminator"]):
-            assert np.abs(leaf).max() > 0, path
-
-    def test_the_translation_networks_losses_do_not_move_the_discriminator(self, sides, x64):
-        function, params, choose = sides
-        gradient = function(params, choose("rotation", "position", "speed", "adversarial"))[1]
-        assert max(np.abs(leaf).max() for leaf in jax.tree.leaves(gradient["discriminator"])) == 0
-        for path, leaf in jax.tree_util.tree_leaves_with_path(function(params, choose("adversarial"))[1]["generator"]):
-            assert np.abs(leaf).max() > 0, path
-
-    def test_one_gradient_of_the_total_is_both(self, sides, x64):
-        function, params, choose = sides
-        total = function(params, choose("total"))[1]
-        judge = function(params, choose("discriminator"))[1]["discriminator"]
-        jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-12), total["discriminator"], judge)
-        parts = {n: function(params, choose(n))[1]["generator"] for n in ("rotation", "position", "speed")}
-        fooled = function(params, choose("adversarial"))[1]["generator"]
-
-        def check(whole, rotation, position, speed, fool):
-            expected = rotation + position + CONFIG.speed_weight * speed + CONFIG.adversarial_weight * fool
-            np.testing.assert_allclose(whole, expected, atol=1e-12)
-
-        jax.tree.map(check, total["generator"], *parts.values(), fooled)
-
-    @pytest.mark.parametrize(
-        ("network", "terms"),
-        [
-            ("generator", ("rotation", "position", "speed", "adversarial")),
-            ("discriminator", ("discriminator",)),
-        ],
-    )
-    def test_is_the_numerical_one(self, sides, x64, network, terms):
-        function, params, choose = sides
-        gradient = function(params, choose(*terms))[1][network]
-        random = np.random.default_rng(5)
-        way = jax.tree.map(lambda leaf: random.normal(size=leaf.shape), params[network])
-        step = 1e-7
-        ahead, behind = (
-            function(
-                params | {network: jax.tree.map(lambda p, w, s=sign: p + s * step * w, params[network], way)},
-                choose(*terms),
-            )[0]
-            for sign in (1, -1)
-        )
-        expected = (ahead - behind) / (2 * step)
-        inner = sum(jax.tree.leaves(jax.tree.map(lambda g, w: np.sum(np.asarray(g) * w), gradient, way)))
-        assert abs(expected) > 1e-3
-        np.testing.assert_allclose(inner, expected, rtol=1e-4)
 
 
 def test_weight_zero_leaves_the_discriminator_out():
@@ -255,7 +128,7 @@ def test_halo_is_how_far_an_output_depends_on_the_audio(depth):
 def test_the_papers_networks():
     """Eight layers of audio encoder and sixteen of U-Net, and a halo that one block of context covers."""
     config = PRESETS["paper"]
-    data = Data(PoseSpace(make_data().body), 30.0, 64, make_data().pose_statistics)
+    data = Data(PoseSpace(make_data().space.body), 30.0, 64, make_data().pose_statistics)
     shapes = jax.eval_shape(build(config, data).init, jax.random.key(0))["generator"]
     layers = lambda tree: sum(1 for name in tree if "Conv" in name)  # noqa: E731
     assert layers(shapes["AudioEncoder_0"]) == 8
@@ -306,6 +179,6 @@ def test_settings_are_checked(change, message):
 
 def test_registry():
     entry = find_model("speech2gesture")
-    assert entry.build is build
-    assert set(entry.poses) == set(WIDTHS)
+    assert entry.builder() is build
+    assert entry.poses == ()
     assert set(entry.presets) == {"tiny", "paper"}
