@@ -30,7 +30,7 @@ from a2g_jax.metrics.rhythm import (
 )
 from a2g_jax.talker.recordings import resample_motion, talk
 from a2g_jax.training.run import Run, demo_run, load_run
-from a2g_jax.training.validation import validate
+from a2g_jax.training.validation import Validator
 
 #: Seconds from a stroke's fastest moment to its syllable's energy peak in the generated corpus.
 LEAD = 0.15
@@ -100,7 +100,8 @@ def on_corpus(run: Run, corpus: Corpus, samples: int, takes: int) -> dict[str, o
 def held_out(run: Run, corpus: Corpus) -> dict[str, object]:
     """Reconstruction error on all held-out data, and that of the training data's mean pose."""
     model = run.config.build()
-    parts = {split: validate(model, run.params, corpus, run.config, split) for split in ("validation", "test")}
+    validate = Validator(model, corpus, run.config)
+    parts = {split: validate(run.params, split=split) for split in ("validation", "test")}
     return {
         split: {name: terms[name] for name in ("reconstruction_cm", "mean_pose_cm")}
         for split, terms in parts.items()

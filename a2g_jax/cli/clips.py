@@ -136,7 +136,7 @@ def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
         write_json(out / "pins.json", pinned.reports)
         return [f"sample {number}, {describe(row)}" for number, rows in enumerate(pinned.reports) for row in rows]
 
-    return Chosen(pinned, {"lanes": (pinned.lane(),), "others": r"pins\.json"}, report)
+    return Chosen(pinned, {"lanes": (pinned.lane(),)}, report)
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:

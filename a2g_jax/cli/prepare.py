@@ -9,6 +9,7 @@ from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, see
 from a2g_jax.cli.paths import existing_file, existing_folder
 from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.pose_kinds import WIDTHS
 
 if TYPE_CHECKING:
     from a2g_jax.data.corpus import Corpus
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pose",
-        choices=("6d", "exponential", "directions", "keypoints"),
+        choices=tuple(WIDTHS),
         help="representation of poses (default: of the paper, the data set or the view)",
     )
     recorded = parser.add_argument_group("recordings")

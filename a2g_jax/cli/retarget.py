@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     """Match the joints, write the motion on the target, and print both.
 
     Raises:
-        InputError: a file that cannot be read, or a rig that is not understood.
+        InputError: a file that cannot be read, or a rig that is not recognised.
     """
     out = Path(options.out)
     if out.suffix.lower() != ".bvh":

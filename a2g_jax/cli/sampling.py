@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli.argument_types import count, formats, seed
 from a2g_jax.config import from_json, parse_flags
-from a2g_jax.generation.formats import PAGE, motion_formats
+from a2g_jax.generation.formats import PAGE, format_names
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--samples``, ``--seed`` and ``--formats``."""
-    known = (*motion_formats(), PAGE)
+    known = format_names()
     parser.add_argument("--samples", type=count, default=5, help="number of motions (default: 5)")
     parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
     parser.add_argument(

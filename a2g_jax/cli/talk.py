@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--formats",
         type=formats(talk_formats()),
         default=",".join(talk_formats()),
-        help="any of wav, textgrid, json, bvh, npz, html, comma-separated (default: all)",
+        help=f"any of {', '.join(talk_formats())}, comma-separated (default: all)",
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from jaxtyping import Bool, Float, Int16, Int32
+from jaxtyping import Bool, Float, Int16, Int32, Int64
 
 from a2g_jax.data.body_json import body_from_json
 from a2g_jax.data.corpus_layout import FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
@@ -231,6 +231,8 @@ class Corpus:
         if name in ("emotion", "speaker"):
             return self.labels[:, ("emotion", "speaker").index(name)]
         if name in ("words", "word_starts"):
+            if not self.has_words:
+                raise InputError(f"{self.path}: none of its recordings has words; prepare them with transcripts.")
             return self._words[("words", "word_starts").index(name)]
         if name == "waveform_start":
             return self._first_samples
@@ -244,20 +246,19 @@ class Corpus:
             for index, entry in enumerate(self.recordings)
         ]
         words, starts = (np.concatenate(part) for part in zip(*rows, strict=True))
-        if not words.any():
-            raise InputError(f"{self.path}: none of its recordings has words; prepare recordings with transcripts.")
         return words, starts
 
+    @property
+    def has_words(self) -> bool:
+        """Whether any recording has a transcript."""
+        return bool(self._words[0].any())
+
     @cached_property
-    def _first_samples(self) -> Int32[np.ndarray, " N"]:
+    def _first_samples(self) -> Int64[np.ndarray, " N"]:
         """Row in the waveform of the first sample of each frame."""
         step = self.mel.sample_rate / self.fps
-        return np.concatenate(
-            [
-                entry.first_sample + np.round(np.arange(entry.frames) * step).astype(np.int32)
-                for entry in self.recordings
-            ]
-        ).astype(np.int32)
+        rows = [entry.first_sample + np.rint(np.arange(entry.frames) * step) for entry in self.recordings]
+        return np.concatenate(rows).astype(np.int64)
 
     @cached_property
     def statistics(self) -> dict[str, Statistics]:

@@ -154,10 +154,10 @@ class PartStream:
                 return None
         del self._coming[number]
         roles = self.corpus.later["parts"][number - 1]
-        return join_rows(self.corpus, roles, [future.result() for future in futures])
+        return join_rows(self.corpus, roles, [future.result() for future in futures], self.arrays)
 
 
-def join_rows(corpus: Corpus, roles: list[Role], arrays: list[dict[str, np.ndarray]]) -> Part:
+def join_rows(corpus: Corpus, roles: list[Role], arrays: list[dict[str, np.ndarray]], names: tuple[str, ...]) -> Part:
     """A part of recordings given as the rows of each."""
     frames = [len(rows["audio"]) for rows in arrays]
     stops = list(accumulate(frames))
@@ -171,8 +171,9 @@ def join_rows(corpus: Corpus, roles: list[Role], arrays: list[dict[str, np.ndarr
     if "waveform" in joined:
         before = np.cumsum([0, *(len(rows["waveform"]) for rows in arrays[:-1])])
         shifted = [rows["waveform_start"] + first for rows, first in zip(arrays, before, strict=True)]
-        joined["waveform_start"] = np.concatenate(shifted).astype(np.int32)
-    return Part({**joined, "emotion": labels[:, 0], "speaker": labels[:, 1]}, segments)
+        joined["waveform_start"] = np.concatenate(shifted)
+    own = {"emotion": labels[:, 0], "speaker": labels[:, 1]}
+    return Part(joined | {name: own[name] for name in own if name in names}, segments)
 
 
 def check_generator(corpus: Corpus) -> None:
@@ -222,5 +223,5 @@ def _generate(
     if "waveform" in arrays:
         step = features.mel.sample_rate / features.fps
         made["waveform"] = rows.waveform
-        made["waveform_start"] = np.round(np.arange(len(rows.audio)) * step).astype(np.int32)
+        made["waveform_start"] = np.rint(np.arange(len(rows.audio)) * step).astype(np.int64)
     return {name: made[name] for name in made if name in (*arrays, "audio", "pose")}

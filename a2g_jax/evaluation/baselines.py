@@ -55,7 +55,7 @@ def with_noise(space: PoseSpace, pose: Pose, degrees: float, rng: np.random.Gene
     """
     turns = matrix_from_axis_angle(jnp.asarray(rng.normal(0.0, np.deg2rad(degrees), (*pose.shape[:2], 3)), jnp.float32))
     rotations = rotations_from_rows(np.asarray(pose, np.float32), space.kind)
-    return np.asarray(jax.jit(space.from_rotations)(rotations @ np.asarray(turns)))
+    return space.write(rotations @ np.asarray(turns))
 
 
 def nearest_neighbour(corpus: Corpus, segment: Segment) -> Pose:

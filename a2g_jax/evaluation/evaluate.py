@@ -12,9 +12,9 @@ from a2g_jax import __version__
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation import baselines as candidates
 from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.evaluation.audit import AudioCondition, listening_audit
+from a2g_jax.evaluation.baselines import mean_pose, nearest_neighbour, other_clip, right_motions, with_noise
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.evaluation.report import BASELINES, describe_metrics
@@ -166,9 +166,17 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
         for segment, count in zip(chosen, frames, strict=True)
     ]
     speakers = [corpus.recordings[segment.recording].speaker for segment in chosen]
+    fields = generator.engine.model.condition_fields
+    if "waveform" in fields:
+        raise InputError(f"{run.config.model}: takes waveforms, but the audit alters audio features; omit --audit.")
 
     def generate(audio: AudioCondition, number: int) -> np.ndarray:
-        rows = next(generator.rows(np.asarray(audio.features, np.float32), 1, (seed + number) % 2**31))
+        # Labels and words are those of the audio, also where it is late or repeated.
+        order = np.roll(np.arange(len(audio.features)) % frames[audio.clip], round(audio.shift * corpus.fps))
+        start = chosen[audio.clip].start
+        given = corpus_condition(run.config, fields, corpus, start, start + frames[audio.clip])
+        given = {name: value[order] if np.ndim(value) else value for name, value in given.items()}
+        rows = next(generator.rows(np.asarray(audio.features, np.float32), 1, (seed + number) % 2**31, **given))
         return scorer.space.wrists(scorer.space.positions(rows))
 
     return listening_audit(generate, clips, speakers, corpus.fps)
@@ -202,10 +210,12 @@ def _candidates(
     for name, run in runs.items():
         generator = Generator(run)
 
-        def model(number: int, generator: Generator = generator) -> list[Pose]:
+        fields = generator.engine.model.condition_fields
+
+        def model(number: int, generator: Generator = generator, fields: tuple[str, ...] = fields) -> list[Pose]:
             segment = segments[number]
             audio = np.asarray(corpus.audio[segment.start : segment.stop])
-            given = corpus_condition(generator.run, corpus, segment.start, segment.stop)
+            given = corpus_condition(generator.run.config, fields, corpus, segment.start, segment.stop)
             # A seed of its own for every clip, so that clips are independent draws.
             return list(generator.rows(audio, samples, (seed + 7919 * (number + 1)) % 2**31, **given))
 
@@ -216,18 +226,18 @@ def _candidates(
         if not corpus.space.has_rotations:
             return None
         rng = np.random.default_rng([seed, number])
-        return [candidates.with_noise(corpus.space, truth(number), degrees, rng)]
+        return [with_noise(corpus.space, truth(number), degrees, rng)]
 
-    baselines: tuple[_Draw, ...] = (
+    rows: tuple[_Draw, ...] = (
         lambda number: [truth(number)],
-        lambda number: candidates.right_motions(corpus, segments[number], samples, seed),
+        lambda number: right_motions(corpus, segments[number], samples, seed),
         lambda number: noise(number, 1.0),
         lambda number: noise(number, 5.0),
-        lambda number: [candidates.nearest_neighbour(corpus, segments[number])],
-        lambda number: [candidates.other_clip(corpus, segments, number)],
-        lambda number: [candidates.mean_pose(corpus, segments[number])],
+        lambda number: [nearest_neighbour(corpus, segments[number])],
+        lambda number: [other_clip(corpus, segments, number)],
+        lambda number: [mean_pose(corpus, segments[number])],
     )
-    yield from zip(BASELINES, baselines, strict=True)
+    yield from zip(BASELINES, rows, strict=True)
 
 
 def _fingerprint(corpus: Corpus) -> str:

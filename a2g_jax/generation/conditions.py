@@ -1,21 +1,28 @@
 """Conditioning from a corpus: labels, words and waveforms of a stretch, for the models that use them."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.training.run import Run
+from a2g_jax.training.run_config import RunConfig
 
 
-def corpus_condition(run: Run, corpus: Corpus, start: int, stop: int) -> dict[str, Any]:
+def corpus_condition(config: RunConfig, fields: Sequence[str], corpus: Corpus, start: int, stop: int) -> dict[str, Any]:
     """Fields of :class:`~a2g_jax.models.base.Condition` for rows ``start`` to ``stop`` of one recording.
 
-    Only those that the run's model declares and the corpus has: an emotion or speaker that the run was not trained on
-    is left out, and so are the audio features, seed poses, controls and latents.
+    An emotion or speaker that the run was not trained on is left out, and so are words where no recording of the corpus
+    has any. Audio features, seed poses, controls and latents are never among them.
+
+    Args:
+        config: of the run that is conditioned.
+        fields: the model's ``condition_fields``.
+
+    Raises:
+        InputError: the model needs the waveform, and the corpus stores none.
     """
-    fields = run.config.build().condition_fields
-    emotions, speakers = (tuple(run.config.corpus.get(name, ())) for name in ("emotions", "speakers"))
+    emotions, speakers = (tuple(config.corpus.get(name, ())) for name in ("emotions", "speakers"))
     given: dict[str, Any] = {}
     emotion, speaker = (int(index) for index in corpus.labels[start])
     if "emotion" in fields and corpus.emotions[emotion] in emotions:
@@ -23,7 +30,7 @@ def corpus_condition(run: Run, corpus: Corpus, start: int, stop: int) -> dict[st
         given["emotion"] = np.tile(weights, (stop - start, 1))
     if "speaker" in fields and corpus.speakers[speaker] in speakers:
         given["speaker"] = np.int32(speakers.index(corpus.speakers[speaker]))
-    if "words" in fields:
+    if "words" in fields and corpus.has_words:
         given["words"] = corpus.array("words")[start:stop]
     if "waveform" in fields:
         first = int(corpus.array("waveform_start")[start])

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import percentiles
-from a2g_jax.models.base import Condition, Latents
+from a2g_jax.models.base import Condition
 from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
@@ -23,6 +23,8 @@ WINDOW = 1024
 #: Samples that an autoregressive model generates side by side: one reading of its weights serves all of them. Always as
 #: many, also for a single one, so that a sample does not depend on how many are requested.
 LANES = 4
+#: Fields of a condition with a row for each frame.
+_BY_FRAME = ("emotion", "words", "controls", "latents")
 
 
 class Engine:
@@ -75,7 +77,7 @@ class Engine:
 
         Args:
             given: conditioning of the whole motion; log-mel features as corpora hold them, not normalised. Fields that
-                the model does not use have to be None, and ``controls`` come from the sampling settings.
+                the model does not use have to be None; ``controls`` are those of the sampling settings if None.
 
         Raises:
             InputError: a field that the model does not use, or too few seed poses.
@@ -84,7 +86,7 @@ class Engine:
         frames, key = len(given.audio), jax.random.key(seed)
         windows = self._windows(given)
         if self._begin is not None:
-            yield from self._in_lanes(list(windows), key, samples, frames, given.seed_poses)
+            yield from self._in_lanes(list(windows), key, samples, frames, self._seeds(given))
             return
         conditions = list(windows)
         for number in range(samples):
@@ -99,14 +101,24 @@ class Engine:
                     f"{self.run.config.model}: takes no {name.replace('_', ' ')}; it is conditioned on"
                     f" {', '.join(self.model.condition_fields)}."
                 )
+        frames = len(given.audio)
+        for name in _BY_FRAME:
+            for part in jax.tree.leaves(getattr(given, name)):
+                if len(part) != frames:
+                    raise InputError(f"{name}: expected a row for each of {frames} frames; got {len(part)}.")
         seeds = given.seed_poses
         if seeds is not None and len(seeds) < self.model.seed_frames:
             raise InputError(f"the seed poses are {len(seeds)} frames; the run needs {self.model.seed_frames} or more.")
 
-    def _in_lanes(self, windows, key, samples: int, frames: int, seed_poses: Any) -> Iterator[Rows]:
+    def _seeds(self, given: Condition) -> Any:
+        """The last seed poses, as many as the model takes."""
+        if given.seed_poses is None:
+            return None
+        return np.asarray(given.seed_poses[len(given.seed_poses) - self.model.seed_frames :], np.float32)
+
+    def _in_lanes(self, windows, key, samples: int, frames: int, seeds: Any) -> Iterator[Rows]:
         """Motions of an autoregressive model: each window starts from the state after the one before."""
         assert self._begin is not None
-        seeds = None if seed_poses is None else np.asarray(seed_poses[-self.model.seed_frames :], np.float32)
         for first in range(0, samples, LANES):
             keys = jax.vmap(lambda number: jax.random.fold_in(key, number))(first + jnp.arange(LANES))
             state, parts = self._begin(self._params, self._summary, keys, seeds), []
@@ -121,31 +133,25 @@ class Engine:
         count = -(-frames // window)
         around = (halo, count * window - frames + halo)
         # The quietest value is what silence looks like after the features' floor.
-        silence = float(np.min(given.audio))
-        padded = np.pad(given.audio, (around, (0, 0)), constant_values=silence)
+        padded = np.pad(given.audio, (around, (0, 0)), constant_values=float(np.min(given.audio)))
         audio: Any = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
-        emotion: Any = None if given.emotion is None else np.pad(given.emotion, (around, (0, 0)), mode="edge")
+        controls: Any = given.controls
+        if controls is None and self._curves:
+            controls = percentiles(self._curves, 0, frames, self.run.config.fps)
+        hold = lambda array: np.pad(np.asarray(array), (around, (0, 0)), mode="edge")  # noqa: E731
+        held = jax.tree.map(hold, {"emotion": given.emotion, "latents": given.latents, "controls": controls})
         words: Any = None if given.words is None else np.pad(given.words, (around,))
-        latents = None
-        if given.latents is not None:
-            parts: Any = [np.pad(np.asarray(part), (around, (0, 0)), mode="edge") for part in given.latents]
-            latents = Latents(*parts)
         for start in range(0, count * window, window):
             rows = slice(start, start + window + 2 * halo)
             cut = Condition(
                 audio=audio[rows],
                 waveform=self._waveform(given, start - halo, window + 2 * halo),
-                emotion=None if emotion is None else emotion[rows],
                 speaker=given.speaker,
                 words=None if words is None else words[rows],
-                controls=self._controls(start - halo, window + 2 * halo),
-                latents=None if latents is None else Latents(latents.mean[rows], latents.scale[rows]),
+                seed_poses=self._seeds(given),
+                **jax.tree.map(lambda array, rows=rows: array[rows], held),
             )
             yield start - halo, self._condition(self._params, self._summary, cut)
-
-    def _controls(self, start: int, frames: int) -> Any:
-        """Requested percentiles of the frames of a window, where the model has controls."""
-        return percentiles(self._curves, start, frames, self.run.config.fps) if self._curves else None
 
     def _waveform(self, given: Condition, start: int, frames: int) -> Any:
         """Samples of the frames of a window; silence before and after the audio."""
@@ -153,7 +159,6 @@ class Engine:
             return None
         rate = self.run.config.mel.sample_rate / self.run.config.fps
         first, count = round(start * rate), round(frames * rate)
-        stop = first + count
-        inside = given.waveform[max(first, 0) : max(stop, 0)]
+        inside = given.waveform[max(first, 0) : max(first + count, 0)]
         before = min(max(-first, 0), count)
         return np.pad(inside, (before, count - before - len(inside))).astype(np.float32)

@@ -12,6 +12,9 @@ from a2g_jax.io.words import Word
 from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
 
+#: Reports of an earlier call, which belong to other motions.
+_REPORTS = r"pins\.json"
+
 
 def export(
     run: Run,
@@ -26,7 +29,6 @@ def export(
     label: str = "",
     words: Sequence[Word] = (),
     lanes: Sequence[Track] = (),
-    others: str = "",
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
     """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``.
@@ -38,7 +40,6 @@ def export(
         title: name of the speech, for the page's heading.
         label: description of the sampler, for the page's subtitle.
         lanes: further tracks of the page's timeline.
-        others: a regular expression for further files of the folder that are replaced.
         report: called with the number of samples done.
 
     Returns:
@@ -49,7 +50,7 @@ def export(
     """
     if PAGE in formats:
         check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
-    files, figures = MotionFiles(out, "sample", formats, others), []
+    files, figures = MotionFiles(out, "sample", formats, _REPORTS), []
     for number, motion in enumerate(sampler.stream(audio, samples, seed)):
         files.write(number, motion)
         if PAGE in formats:

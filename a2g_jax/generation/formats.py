@@ -5,7 +5,7 @@ Importable without JAX: writers are imported when they write.
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -44,24 +44,35 @@ PAGE = "html"
 _PAGE_LIMIT = 20_000_000
 
 
-def motion_formats() -> dict[str, MotionFormat]:
-    """The formats of this package, and those that other packages add in the entry-point group ``a2g_jax.formats``.
+#: Formats with one file for all motions, whose names no other package may take.
+_OTHERS = ("wav", "textgrid", "json", PAGE)
+
+
+def format_names() -> tuple[str, ...]:
+    """Names of the formats of motions, and of the page: this package's, then those of the entry-point group
+    ``a2g_jax.formats``. Nothing is imported."""
+    added = (name for name in entry_points_of(GROUP) if name not in (*MOTION_FORMATS, *_OTHERS))
+    return (*MOTION_FORMATS, *added, PAGE)
+
+
+def motion_format(name: str) -> MotionFormat | None:
+    """The format of that name; None where it has no file for each motion.
 
     Raises:
         InputError: a format of another package cannot be loaded.
     """
-    found = dict(MOTION_FORMATS)
-    for name, point in entry_points_of(GROUP).items():
-        added = load_entry_point(point, "format")
-        if not isinstance(added, MotionFormat):
-            raise InputError(f"format {name!r} ({point.value}): expected a MotionFormat; got {type(added).__name__}.")
-        found.setdefault(name, added)
+    if name in MOTION_FORMATS or name in _OTHERS:
+        return MOTION_FORMATS.get(name)
+    point = entry_points_of(GROUP)[name]
+    found = load_entry_point(point, "format")
+    if not isinstance(found, MotionFormat):
+        raise InputError(f"format {name!r} ({point.value}): expected a MotionFormat; got {type(found).__name__}.")
     return found
 
 
 def talk_formats() -> tuple[str, ...]:
     """Names of the formats of a generated recording: of its speech and truth, of motions, and the page."""
-    return ("wav", "textgrid", "json", *motion_formats(), PAGE)
+    return ("wav", "textgrid", "json", *format_names())
 
 
 def chosen_formats(text: str, available: Sequence[str]) -> tuple[str, ...]:
@@ -103,23 +114,21 @@ class MotionFiles:
         stem: str,
         formats: Sequence[str],
         others: str = "",
-        available: Mapping[str, MotionFormat] | None = None,
     ) -> None:
         """
         Args:
             stem: beginning of the files' names.
             formats: names of formats; those without a file for each motion are ignored.
             others: a regular expression for further files that are replaced.
-            available: formats by name; those of :func:`motion_formats` if None.
 
         Raises:
-            InputError: a folder that cannot be used.
+            InputError: a folder or a format that cannot be used.
         """
-        available = motion_formats() if available is None else available
+        found = {name: motion_format(name) for name in formats}
+        self._formats = {name: each for name, each in found.items() if each is not None}
         self.folder = make_folder(out)
         self._stem = stem
-        self._formats = {name: available[name] for name in formats if name in available}
-        suffixes = "|".join(re.escape(each.suffix) for each in available.values())
+        suffixes = "|".join(re.escape(each.suffix) for each in (MOTION_FORMATS | self._formats).values())
         own = re.compile(rf"{stem}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
         for old in self.folder.iterdir():
             if own.fullmatch(old.name) and not old.is_dir():

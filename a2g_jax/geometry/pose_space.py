@@ -1,6 +1,6 @@
 """The meaning of a pose's numbers: rotations of joints, directions of bones, or keypoints.
 
-The only module that compares the kinds of poses by name. Everything else asks a :class:`PoseSpace`.
+The only module that compares the kinds of poses by name; all others use a :class:`PoseSpace`.
 """
 
 from dataclasses import dataclass
@@ -16,14 +16,11 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_kinds import WIDTHS as WIDTHS
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 
-#: Values of each joint, bone or point. 6d: the first two columns of a local rotation matrix (Zhou et al. 2019);
-#: exponential: axis times angle of a local rotation, radians, at most pi; directions: a unit vector from parent to
-#: child; keypoints: the place of a point in the image.
-WIDTHS = {"6d": 6, "exponential": 3, "directions": 3, "keypoints": 2}
 #: Names of the rows of a pose, for messages.
 _NOUNS = {"6d": "joints", "exponential": "joints", "directions": "bone directions", "keypoints": "keypoints"}
 
@@ -148,6 +145,14 @@ class PoseSpace:
         """:meth:`rotations`, compiled, as a NumPy array."""
         return np.asarray(_rotations(jnp.asarray(pose), _Kind(self))) if self.has_rotations else None
 
+    def write(self, rotations: Float[np.ndarray, "T R 3 3"]) -> Float[np.ndarray, "T R D"]:
+        """:meth:`from_rotations`, compiled, as a NumPy array.
+
+        Raises:
+            InputError: poses are keypoints or directions.
+        """
+        return np.asarray(_poses(rotations, _Kind(self)))
+
     def positions(self, pose: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, "T P _"]:
         """Positions of the points of a pose, compiled, as a NumPy array.
 
@@ -212,6 +217,11 @@ class _Kind:
 @partial(jax.jit, static_argnums=1)
 def _rotations(pose, kind: _Kind):
     return kind.space.rotations(pose)
+
+
+@partial(jax.jit, static_argnums=1)
+def _poses(rotations, kind: _Kind):
+    return kind.space.from_rotations(rotations)
 
 
 @partial(jax.jit, static_argnums=2)

@@ -16,9 +16,10 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.likelihood import compiled_log_likelihood
 from a2g_jax.features.mel import log_mel
-from a2g_jax.generation.audio2gestures.pins import face, read_on_skeleton
+from a2g_jax.generation.clips import read_on_skeleton
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
+from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.unlikely import Moment, robust_scale, unlikely_moments

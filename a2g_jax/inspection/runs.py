@@ -14,6 +14,7 @@ from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.tree import body_facts
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import SHIPPED
+from a2g_jax.training.stages import span_at, stage_spans
 
 _METRICS = "metrics.jsonl"
 #: Ratio of the last to the best validation loss from which the difference is no fluctuation.
@@ -37,7 +38,8 @@ def inspect_run(name: str | os.PathLike[str]) -> Report:
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
     """Findings on unfinished training, losses that are not numbers, and rising validation loss."""
     findings = []
-    wanted = run.config.train_config.steps
+    spans = stage_spans(run.config.build(), run.config.train_config)
+    wanted, stage = spans[-1].stop, span_at(spans, max(run.steps - 1, 0))
     if run.steps < wanted:
         message = f"{run.steps} of {wanted} steps are done."
         findings.append(
@@ -47,7 +49,12 @@ def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
     if None in losses:
         message = f"{losses.count(None)} logged losses are not numbers."
         findings.append(Finding("warning", "nan", message, "Lower the learning rate, or inspect the corpus."))
-    checked = [line["loss"] for line in log if line.get("split") == "validation" and line.get("loss") is not None]
+    # Losses of different stages cannot be compared.
+    checked = [
+        line["loss"]
+        for line in log
+        if line.get("split") == "validation" and line.get("loss") is not None and line.get("step", 0) > stage.first
+    ]
     # Losses below zero, as of likelihoods, have no ratio.
     if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
         message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
@@ -84,6 +91,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
             },
         },
         "model settings": _plain(asdict(config.model_config)),
+        "sampling settings": _plain(asdict(config.sampling_settings)),
         "training settings": _plain(asdict(config.train_config)),
     }
     last = {line["split"]: line for line in log if "split" in line}

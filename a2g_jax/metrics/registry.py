@@ -9,10 +9,8 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
 from a2g_jax.errors import InputError
-from a2g_jax.plugins import entry_points_of, load_object
-
-#: Entry-point group of metrics.
-GROUP = "a2g_jax.metrics"
+from a2g_jax.plugins import METRICS as GROUP
+from a2g_jax.plugins import entry_points_of, load_entry_point, load_object
 
 Scope = Literal["pair", "motion", "clip", "set"]
 
@@ -62,11 +60,10 @@ def find_metrics(references: Sequence[str] = (), taken: Sequence[str] = ()) -> t
     Raises:
         InputError: one cannot be loaded, is no :class:`Metric`, or has a key that another one has.
     """
-    names = [(f"metric {name!r}", point.value) for name, point in entry_points_of(GROUP).items()]
-    names += [(f"metric {reference}", reference) for reference in references]
+    loaded = [(f"metric {n!r}", p.value, load_entry_point(p, "metric")) for n, p in entry_points_of(GROUP).items()]
+    loaded += [(f"metric {reference}", reference, load_object(reference, "metric")) for reference in references]
     found: dict[str, Metric] = {}
-    for name, reference in names:
-        metric = load_object(reference, "metric")
+    for name, reference, metric in loaded:
         if not isinstance(metric, Metric) or metric.function is None or not metric.key:
             raise InputError(
                 f"{name}: {reference} is no Metric with a key and a function; see a2g_jax.metrics.registry."

@@ -1,8 +1,9 @@
 """The models, by the names of the command line; importable without JAX.
 
 A model of another package is found through an entry point of the group ``a2g_jax.models``, or is named
-``package.module:ENTRY`` on the command line. A run folder is data and imports nothing: the model that it names has to
-be one of these, or be allowed by ``A2G_MODELS=package.module:ENTRY`` (comma-separated) in the environment.
+``package.module:ENTRY`` on the command line. A run folder imports no other code: the model that it names has to be
+of this package or an entry point, or be allowed by
+``A2G_MODELS=package.module:ENTRY`` (comma-separated) in the environment.
 """
 
 import os
@@ -41,8 +42,8 @@ def find_model(name: str) -> Entry:
         entry: Entry = import_module(MODELS[name]).ENTRY
         return entry
     if ":" in name:
-        _allowed.add(name)
         found = load_object(name, "model")
+        _allowed.add(name)
     elif name in (others := entry_points_of(GROUP)):
         found = load_entry_point(others[name], "model")
     else:

@@ -10,7 +10,7 @@ class TrainConfig:
     """How a model is trained; the defaults are Audio2Gestures' (extended paper, Sec. 5.3.3)."""
 
     steps: int = 180_000
-    """Training steps in all; resuming counts those already done."""
+    """Training steps, those done before a resume included; a model may add stages with their own number of steps."""
     batch_size: int = 32
     """Clips in a batch."""
     learning_rate: float = 1e-4

@@ -50,6 +50,8 @@ class Checkpoints:
         path = self.folder / str(steps[-1])
         try:
             tree = _load(path, like)
+        except InputError:
+            raise
         except Exception as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(
@@ -61,7 +63,10 @@ class Checkpoints:
 
 def _load(path: Path, like: TrainState) -> dict[str, Any]:
     """The arrays of a checkpoint; those of version 0.1 had the state of one optimiser under another name."""
-    if len(like.optimisers) > 1 or "optimisers" in _names(path):
+    old = "optimisers" not in _names(path)
+    if old and len(like.optimisers) > 1:
+        raise InputError(f"{path}: is of version 0.1, which had one optimiser; start again without --resume.")
+    if not old:
         return dict(ocp.load(path, like._asdict()))
     (name, optimiser), *_ = like.optimisers.items()
     before = {key: value for key, value in like._asdict().items() if key != "optimisers"}

@@ -22,11 +22,11 @@ from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.log import MetricsLog
-from a2g_jax.training.run import Run, RunConfig, run_to_json, save_run
+from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
 from a2g_jax.training.run_file import FORMAT, RUN_FILE, WEIGHTS_FILE
 from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
-from a2g_jax.training.validation import collect_summary, validate
+from a2g_jax.training.validation import Validator, collect_summary
 
 #: Settings that may change on resuming, because the computation of a step does not depend on them.
 _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
@@ -73,6 +73,7 @@ def train(
     _check_folder(out, config, checkpoints, resume, corpus.on_demand)
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
+        config = keep_sampling(config, out)
     done = int(state.step)
     export = partial(_export, config, model, corpus, out)
     make_folder(out)
@@ -85,6 +86,7 @@ def train(
         write_json(out / RUN_FILE, run_to_json(config, done))
         run = None
         steps = _Steps(config, shape)
+        validate = Validator(model, corpus, config)
         ends = {span.stop for span in spans}
         while done < total:
             span = span_at(spans, done)
@@ -102,7 +104,7 @@ def train(
             else:
                 log.tick(done)
             if done % settings.validate_every == 0 or done in ends:
-                log.write_validation(done, validate(model, state.params, corpus, config, stage=span.stage))
+                log.write_validation(done, validate(state.params, span.stage))
             if done % settings.checkpoint_every == 0 or done in ends or stop.is_set():
                 _check_finite(state, done, {}, checkpoints)
                 checkpoints.save(state)
@@ -195,7 +197,9 @@ def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunCo
     compute = jax.jit(finish, donate_argnums=0)
 
     def on(part: Part) -> _Step:
-        if sum(array.nbytes for array in part.arrays.values()) / 1e6 <= settings.device_megabytes:
+        size = sum(array.nbytes for array in part.arrays.values()) / 1e6
+        # Rows of the device are counted in 32 bits.
+        if size <= settings.device_megabytes and max(len(array) for array in part.arrays.values()) < 2**31:
             arrays = {name: jax.device_put(np.asarray(array)) for name, array in part.arrays.items()}
             return lambda state: on_device(state, arrays)
 

@@ -1,7 +1,7 @@
 """A run folder: everything that generation needs, in JSON and safetensors."""
 
 import os
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +148,13 @@ def demo_feature_run() -> tuple[Run, str]:
     """The shipped feature network, and the SHA-256 of its weights."""
     folder = run_folder("demo", SHIPPED_FEATURES)
     return load_run(folder), sha256_file(folder / WEIGHTS_FILE)
+
+
+def keep_sampling(config: RunConfig, folder: Path) -> RunConfig:
+    """The run with the sampling settings of its folder, which may have been changed since it was trained."""
+    about = folder / RUN_FILE
+    _, sampling = split_settings(config.entry, read_description(folder))
+    return replace(config, sampling=from_json(config.entry.sampling, sampling, str(about)))
 
 
 def _check_params(weights: Path, model: Model, params: Params) -> None:

@@ -53,13 +53,17 @@ def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any]
 
     Args:
         values: the contents of ``run.json``.
+
+    Raises:
+        InputError: damaged contents.
     """
-    settings: dict[str, Any] = dict(values["model_config"])
-    sampling = values.get("sampling")
+    settings, sampling = values.get("model_config"), values.get("sampling")
+    if not isinstance(settings, dict) or not isinstance(sampling, dict | None):
+        raise InputError(f"{RUN_FILE}: is damaged (model_config or sampling); restore it or train again.")
     if sampling is not None:
         return settings, dict(sampling)
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
-    moved: dict[str, str] = {name: _MOVED.get(name, name) for name in settings}
+    moved = {name: _MOVED.get(str(name), str(name)) for name in settings}
     return (
         {name: value for name, value in settings.items() if moved[name] not in own},
         {moved[name]: value for name, value in settings.items() if moved[name] in own},

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from typing import NamedTuple
 
+import jax
+
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Model, Stage
 from a2g_jax.models.train_config import TrainConfig
@@ -27,13 +29,24 @@ def stage_spans(model: Model, config: TrainConfig) -> tuple[StageSpan, ...]:
     """The stages one after another, with their steps.
 
     Raises:
-        InputError: stages of one name, more than one without a number of steps, or parameters that do not exist.
+        InputError: stages or updates of one name, more than one stage without a number of steps, or parameters that do
+            not exist.
     """
     names = [stage.name for stage in model.stages]
     if not names or len(set(names)) < len(names):
         raise InputError(f"{model.name}: expected stages of different names; got {', '.join(names) or 'none'}.")
     if sum(stage.steps is None for stage in model.stages) > 1:
         raise InputError(f"{model.name}: expected a number of steps for all stages but one.")
+    parameters = set(jax.eval_shape(model.init, jax.random.key(0)))
+    for stage in model.stages:
+        updates = [update.name for update in stage.updates]
+        if not updates or len(set(updates)) < len(updates):
+            raise InputError(f"{model.name}, stage {stage.name}: expected updates of different names; got {updates}.")
+        if unknown := {name for update in stage.updates for name in update.trains} - parameters:
+            raise InputError(
+                f"{model.name}, stage {stage.name}: trains {', '.join(sorted(unknown))}; the parameters are"
+                f" {', '.join(sorted(parameters))}."
+            )
     spans: list[StageSpan] = []
     first = 0
     for stage in model.stages:

@@ -111,6 +111,8 @@ def _gradient(update: Update, params: Params, key: Key[Array, ""], batch: Batch,
 
 def joint_loss(stage: Stage) -> Loss:
     """A loss: the sum of those of a stage's updates, with the terms of all."""
+    if len(stage.updates) == 1:
+        return stage.updates[0].loss
 
     def loss(
         params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]

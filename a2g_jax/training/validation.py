@@ -37,39 +37,40 @@ def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: 
         yield make(None, {name: jnp.asarray(clip) for name, clip in clips.items()})
 
 
-def validate(
-    model: Model,
-    params: Params,
-    corpus: Corpus,
-    config: RunConfig,
-    split: str = "validation",
-    stage: Stage | None = None,
-) -> dict[str, float]:
-    """Loss terms on a held-out split with a fixed key, and errors of the reconstruction and of the mean pose.
+class Validator:
+    """Held-out losses of a run; its programs are compiled once."""
 
-    Errors are mean distances of joints in cm (``reconstruction_cm``, ``mean_pose_cm``), or for poses without a skeleton
-    mean distances of rows in their own unit (``reconstruction_error``, ``mean_pose_error``).
+    def __init__(self, model: Model, corpus: Corpus, config: RunConfig) -> None:
+        self._model, self._corpus, self._config = model, corpus, config
+        self._losses = {stage.name: jax.jit(stage.validation_loss or joint_loss(stage)) for stage in model.stages}
+        self._rebuild = jax.jit(lambda *inputs: _rebuild(model.reconstruct, config.space, *inputs))
 
-    Empty when every stretch of the split is shorter than a clip.
+    def __call__(self, params: Params, stage: Stage | None = None, split: str = "validation") -> dict[str, float]:
+        """Loss terms on a held-out split with a fixed key, and errors of the reconstruction and of the mean pose.
 
-    Args:
-        stage: its loss is computed; the last stage of the model if None.
-    """
-    totals: dict[str, float] = {}
-    count = 0
-    chosen, mean_pose = stage or model.stages[-1], config.statistics["pose"].mean
-    loss = jax.jit(chosen.validation_loss or joint_loss(chosen))
-    rebuild = jax.jit(lambda *inputs: _rebuild(model.reconstruct, config.space, *inputs))
-    for number, batch in enumerate(_batches(model, corpus, config, split, _VALIDATION_CLIPS)):
-        value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
-        figures = {"loss": value, **terms}
-        if model.reconstruct is not None:
-            figures |= rebuild(params, batch, mean_pose)
-        clips = len(batch.audio)
-        for name, figure in figures.items():
-            totals[name] = totals.get(name, 0.0) + float(figure) * clips
-        count += clips
-    return {name: total / count for name, total in totals.items()}
+        Errors are mean distances of joints in cm (``reconstruction_cm``, ``mean_pose_cm``), or for poses without a
+        skeleton mean distances of rows in their own unit (``reconstruction_error``, ``mean_pose_error``).
+
+        Empty when every stretch of the split is shorter than a clip.
+
+        Args:
+            stage: its loss is computed; the last stage of the model if None.
+        """
+        totals: dict[str, float] = {}
+        count = 0
+        loss = self._losses[(stage or self._model.stages[-1]).name]
+        mean_pose = self._config.statistics["pose"].mean
+        batches = _batches(self._model, self._corpus, self._config, split, _VALIDATION_CLIPS)
+        for number, batch in enumerate(batches):
+            value, terms = loss(params, jax.random.fold_in(jax.random.key(0), number), batch, jnp.int32(2**30))
+            figures = {"loss": value, **terms}
+            if self._model.reconstruct is not None:
+                figures |= self._rebuild(params, batch, mean_pose)
+            clips = len(batch.audio)
+            for name, figure in figures.items():
+                totals[name] = totals.get(name, 0.0) + float(figure) * clips
+            count += clips
+        return {name: total / count for name, total in totals.items()}
 
 
 def _rebuild(reconstruct: Any, space: PoseSpace, params: Params, batch: Batch, mean_pose: Any) -> dict[str, Any]:

@@ -11,10 +11,12 @@ import jax
 import numpy as np
 import pytest
 
+from a2g_jax.data.batch import FIELDS, clip_shape
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.on_demand import OnDemand, PartStream, split_roles
 from a2g_jax.data.prepare import prepare_talker
+from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import WorkerDiedError
 from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.talker import recordings
@@ -33,8 +35,9 @@ def folders(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recordings, "RECORDING_SECONDS", 5.0)
         path = tmp_path_factory.mktemp("on_demand")
-        prepare_talker(path / "stored", OPTIONS, workers=1)
-        prepare_talker(path / "corpus", OPTIONS, workers=1, on_demand=SMALL)
+        features = Features(waveform=True)
+        prepare_talker(path / "stored", OPTIONS, features, workers=1)
+        prepare_talker(path / "corpus", OPTIONS, features, workers=1, on_demand=SMALL)
     return path
 
 
@@ -57,14 +60,25 @@ def test_parts_hold_the_rows_that_would_be_stored(folders, corpus):
     assert corpus.parts == 3
     assert len(corpus.recordings) == 6
     np.testing.assert_array_equal(corpus.pose, stored.pose[: corpus.frames])
-    with PartStream(corpus, part_steps=1, total_steps=3, workers=1) as parts:
+    names = clip_shape(tuple(FIELDS), 16, corpus.fps, corpus.mel.sample_rate).arrays
+    with PartStream(corpus, part_steps=1, total_steps=3, workers=1, arrays=names) as parts:
         first = parts.get(0)
+        assert set(first.arrays) == set(names)
         assert [segment.recording for segment in first.segments] == [s.recording for s in corpus.segments("train")]
         for number in (1, 2):
             part = parts.get(number)
             rows = slice(corpus.frames + 300 * (number - 1), corpus.frames + 300 * number)
-            np.testing.assert_array_equal(part.arrays["audio"], stored.audio[rows])
-            np.testing.assert_array_equal(part.arrays["pose"], stored.pose[rows])
+            for name in ("audio", "pose", "words", "word_starts"):
+                np.testing.assert_array_equal(part.arrays[name], stored.array(name)[rows], err_msg=name)
+            for name, ours, theirs in (
+                ("emotion", corpus.emotions, stored.emotions),
+                ("speaker", corpus.speakers, stored.speakers),
+            ):
+                indices = stored.array(name)[rows]
+                assert [ours[index] for index in part.arrays[name]] == [theirs[index] for index in indices]
+            starts = stored.array("waveform_start")[rows]
+            np.testing.assert_array_equal(part.arrays["waveform_start"], starts - starts[0])
+            np.testing.assert_array_equal(part.arrays["waveform"], stored.waveform[starts[0] :][: 10 * 16000])
             assert [tuple(segment) for segment in part.segments] == [(0, 0, 150), (1, 150, 300)]
             assert len(parts._coming) <= 1  # the next part at most
 

@@ -2,10 +2,12 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -13,13 +15,17 @@ import numpy as np
 import pytest
 
 from a2g_jax.cli import main
+from a2g_jax.data.batch import Batch
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.audio import write_audio
+from a2g_jax.models.base import Data
 from a2g_jax.models.registry import find_model, find_trained_model
 from a2g_jax.training.run import load_run
+from a2g_jax.training.stages import stage_spans
+from a2g_jax.training.state import advance, init_state
 
 PACKAGE = Path(__file__).parent / "toy_package"
 MODEL = "toy_gestures:ENTRY"
@@ -68,27 +74,30 @@ def test_both_stages_are_trained_and_the_second_leaves_the_first_alone(toy_run):
         assert np.array_equal(now, then) == (path[0] != "spread"), path
 
 
-def test_resuming_after_sigkill_equals_not_having_stopped(toy_run, toy_corpus, tmp_path):
-    command = [sys.executable, "-m", "a2g_jax.cli", "train", MODEL, "--corpus", str(toy_corpus.path), "--out"]
-    folder = tmp_path / "run"
+def test_resuming_after_sigkill_equals_not_having_stopped(toy_corpus, tmp_path):
+    """Killed once in each stage."""
+    folder, whole = tmp_path / "killed", tmp_path / "whole"
+    settings = ["--steps", "60", "--spread-steps", "60", "--checkpoint-every", "3", "--keep-checkpoints", "99"]
+    train = ["train", MODEL, "--corpus", str(toy_corpus.path), *settings, "--out"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(PACKAGE), str(Path(__file__).parents[2])])}
-    for wanted in (5, 15):  # one kill in each stage
+    for wanted in (9, 69):
         process = subprocess.Popen(
-            [*command, str(folder), "--resume"], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [sys.executable, "-m", "a2g_jax.cli", *train, str(folder), "--resume"],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
-        end = time.monotonic() + 240
-        while not (folder / "checkpoints" / str(wanted)).is_dir():
+        end = time.monotonic() + 400
+        while not (folder / "checkpoints" / str(wanted)).is_dir() and process.poll() is None:
             assert time.monotonic() < end
-            assert process.poll() is None or (folder / "checkpoints" / str(wanted)).is_dir() or process.returncode == 0
-            if process.poll() is not None:
-                break
-            time.sleep(0.02)
+            time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
-        process.wait()
-    assert main(["train", MODEL, "--corpus", str(toy_corpus.path), "--out", str(folder), "--resume"]) == 0
-    ours, theirs = arrays(folder), arrays(toy_run)
+        assert process.wait() == -signal.SIGKILL, "it was killed before it had finished"
+    assert main([*train, str(folder), "--resume"]) == 0
+    assert main([*train, str(whole)]) == 0
+    ours, theirs = arrays(folder), arrays(whole)
     assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
-    assert (folder / "metrics.jsonl").read_text() == (toy_run / "metrics.jsonl").read_text()
+    assert (folder / "metrics.jsonl").read_text() == (whole / "metrics.jsonl").read_text()
 
 
 def test_it_generates_from_labels_words_and_seed_poses(toy_run, toy_corpus):
@@ -96,7 +105,7 @@ def test_it_generates_from_labels_words_and_seed_poses(toy_run, toy_corpus):
     generator = Generator(run, window=128)
     corpus = Corpus.open(toy_corpus.path)
     features = np.asarray(corpus.audio[:60])
-    given = corpus_condition(run, corpus, 0, 60)
+    given = corpus_condition(run.config, generator.engine.model.condition_fields, corpus, 0, 60)
     assert set(given) == {"emotion", "words"}
     draw = lambda **more: np.stack(list(generator.rows(features, 2, 0, **more)))  # noqa: E731
     plain, conditioned = draw(), draw(**given)
@@ -107,8 +116,36 @@ def test_it_generates_from_labels_words_and_seed_poses(toy_run, toy_corpus):
     assert np.abs(seeded[:, 0] - corpus.pose[59]).mean() < np.abs(plain[:, 0] - corpus.pose[59]).mean()
     with pytest.raises(InputError, match="takes no latents"):
         draw(latents=(features, features))
+    with pytest.raises(InputError, match="words: expected a row for each of 60 frames; got 59"):
+        draw(words=given["words"][:59])
     with pytest.raises(InputError, match="needs 2 or more"):
         draw(seed_poses=np.asarray(corpus.pose[:1]))
+
+
+def test_changed_sampling_settings_survive_a_resume(toy_run, toy_corpus, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(toy_run, folder)
+    values = json.loads((folder / "run.json").read_text())
+    values["sampling"]["scale"] = 0.25
+    (folder / "run.json").write_text(json.dumps(values))
+    assert main(["train", MODEL, "--corpus", str(toy_corpus.path), "--out", str(folder), "--resume"]) == 0
+    assert json.loads((folder / "run.json").read_text())["sampling"] == {"scale": 0.25}
+
+
+def test_impossible_stages_are_named(toy_corpus):
+    entry = find_model(MODEL)
+    data = Data(toy_corpus.space, 30.0, toy_corpus.mel.width, toy_corpus.statistics["pose"], ("a", "b"))
+    model = entry.builder()(entry.presets["tiny"], data, entry.sampling())
+    (judge, player), second = model.stages[0].updates, model.stages[1]
+    cases = {
+        "trains nobody; the parameters are": (second._replace(updates=(player._replace(trains=("nobody",)),)),),
+        "expected updates of different names": (second._replace(updates=(judge, judge)),),
+        "expected stages of different names": (second, second),
+        "a number of steps for all stages but one": (model.stages[0], second._replace(steps=None)),
+    }
+    for message, stages in cases.items():
+        with pytest.raises(InputError, match=message):
+            stage_spans(model._replace(stages=stages), entry.training["tiny"])
 
 
 def test_the_commands_take_it(toy_run, toy_corpus, tmp_path, capsys):
@@ -150,12 +187,6 @@ def test_an_entry_point_names_it(tmp_path, monkeypatch):
 
 def test_the_gan_clips_each_player_alone(toy_corpus):
     """With the discriminator's loss a million times as large, the generator's step is the same."""
-    from dataclasses import replace
-
-    from a2g_jax.data.batch import Batch
-    from a2g_jax.models.base import Data
-    from a2g_jax.training.stages import stage_spans
-    from a2g_jax.training.state import advance, init_state
 
     entry = find_model(MODEL)
     data = Data(toy_corpus.space, 30.0, toy_corpus.mel.width, toy_corpus.statistics["pose"], ("a", "b"))

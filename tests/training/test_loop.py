@@ -99,7 +99,7 @@ def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config)
     config = toy_run_config()
     model = config.build()
     params = jax.jit(model.init)(jax.random.key(0))
-    figures = evaluation.validate(model, params, toy_corpus, config)
+    figures = evaluation.Validator(model, toy_corpus, config)(params)
     starts = evaluation.tiled_starts(toy_corpus, "validation", 16)
     assert len(starts) == 18
     single = []

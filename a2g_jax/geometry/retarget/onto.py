@@ -22,7 +22,7 @@ def on_skeleton(motion: Motion, skeleton: Skeleton, fps: float, name: str) -> Mo
         name: of the motion, for messages.
 
     Raises:
-        InputError: a rig that is not understood.
+        InputError: a rig that is not recognised.
     """
     if not same_rest(motion.skeleton, skeleton):
         source = find_rig(motion, name=name)

@@ -1,0 +1,67 @@
+"""The window loop: every field of a condition reaches the windows, cut to their frames."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from a2g_jax.generation.engine import Engine
+from a2g_jax.geometry.pose_space import PoseSpace
+from a2g_jax.models.base import Condition, Model, Stage, Update
+from a2g_jax.training.run_config import Run, RunConfig
+
+FRAMES, RATE = 300, 16000 / 30
+
+
+def recorder(space):
+    """A model whose pose has the fields of its condition, one in each value of the first joint."""
+    rows, width = space.shape
+
+    def condition(params, summary, given):
+        frames = given.audio.shape[0]
+        # 16000 / 30 is no whole number, so the sample in the middle of a frame is only nearly the frame's.
+        middle = jnp.arange(frames) * RATE + RATE / 2
+        sound = jnp.interp(middle, jnp.arange(len(given.waveform)), given.waveform)
+        columns = [given.emotion[:, 1], given.words, sound, jnp.full(frames, given.speaker)]
+        columns.append(jnp.full(frames, given.seed_poses[-1, 0, 0]))
+        return jnp.stack([*columns, jnp.arange(frames) * 1.0], axis=-1)
+
+    def sample(params, summary, key, given, start):
+        return jnp.zeros((len(given), rows, width)).at[:, 0, :6].set(given)
+
+    return Model(
+        "recorder",
+        None,
+        clip_frames=16,
+        halo=3,
+        init=lambda key: {},
+        stages=(Stage((Update(lambda *_: (jnp.zeros(()), {})),)),),
+        summarise=lambda *_: {},
+        condition=condition,
+        condition_fields=("audio", "waveform", "emotion", "speaker", "words", "seed_poses"),
+        sample=sample,
+        seed_frames=2,
+    )
+
+
+@pytest.mark.parametrize("window", [128, 512])
+def test_windows_hold_their_frames(toy_run_config, window, monkeypatch):
+    monkeypatch.setattr(RunConfig, "build", lambda config: recorder(config.space))
+    monkeypatch.setattr(PoseSpace, "valid", lambda space, pose: pose)
+    config = toy_run_config()
+    engine = Engine(Run(config, {}, {}, 0), window)
+    rng = np.random.default_rng(0)
+    ramp = np.linspace(0.0, 1.0, FRAMES, dtype=np.float32)
+    given = Condition(
+        audio=rng.normal(size=(FRAMES, config.mel.width)).astype(np.float32),
+        waveform=np.repeat(ramp, 534)[: round(FRAMES * RATE)],
+        emotion=np.stack([1.0 - ramp, ramp], axis=-1),
+        speaker=np.int32(3),
+        words=np.arange(FRAMES, dtype=np.int32),
+        seed_poses=np.full((5, *config.space.shape), 7.0, np.float32),
+    )
+    (rows,) = engine.rows(given, 1)
+    np.testing.assert_allclose(rows[:, 0, 0], ramp, atol=1e-6)
+    np.testing.assert_array_equal(rows[:, 0, 1], np.arange(FRAMES))
+    np.testing.assert_allclose(rows[:, 0, 2], ramp, atol=0.01)
+    assert set(rows[:, 0, 3]) == {3.0}
+    assert set(rows[:, 0, 4]) == {7.0}
