@@ -59,7 +59,7 @@ def test_flags(tmp_path, short, capsys):
         (["talker", "--jitter", "90"], "--jitter: expected degrees from 0 to 45; got 90"),
         (["talker", "--jitter", "much"], "expected a number above 0; got 'much'"),
         (["talker", "--workers", "0"], "from 1 to 1000; got '0'"),
-        (["talker", "--on-demand"], "stores 60 minutes and generates what is beyond them in training; 30 are not more"),
+        (["talker", "--on-demand"], "stores 60 minutes and generates the rest in training; 30 are not more"),
         (["talker", "--minutes", "0.1"], "are too few"),
         (["talker", "--joints", "all"], "--joints is for recordings"),
         (["folder", ".", "--speakers", "ada"], "--speakers is for 'a2g prepare talker'"),

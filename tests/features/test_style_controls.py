@@ -100,7 +100,7 @@ def test_poses_are_measured_where_their_joints_are(motion, hands):
 def test_poses_without_wrists_are_refused(motion):
     nothing = Statistics(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
     points = Data(PoseSpace(PoseLayout(("a", "b"), ((0, 1),)), "directions"), FPS, 4, nothing)
-    with pytest.raises(InputError, match=r"--style-controls: .* holds directions"):
+    with pytest.raises(InputError, match=r"--style-controls: .* holds bone directions"):
         check_controls(("height",), points)
     check_controls((), points)
     names = tuple(name.replace("Wrist", "Claw") for name in motion.skeleton.names)
