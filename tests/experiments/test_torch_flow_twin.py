@@ -44,7 +44,7 @@ class Setting:
         normal = lambda *size: jnp.asarray(rng.normal(size=size), jnp.float32)  # noqa: E731
         inner = config.clip_frames - config.history_frames - config.lookahead_frames
         self.flat, self.audio = normal(CLIPS, config.clip_frames, ROWS), normal(CLIPS, config.clip_frames, BANDS)
-        self.seen = jnp.asarray(rng.random((CLIPS, inner, config.history_frames)) < 0.6)
+        self.mask = jnp.asarray(rng.random((CLIPS, inner, config.history_frames)) < 0.6)
         self.z = normal(CLIPS, inner, ROWS)
         self.twin = twins.Twin(config, ROWS, BANDS)
         weights.load_params(self.twin, self.params)
