@@ -148,10 +148,8 @@ class Corpus:
             InputError: the corpus holds keypoints or directions.
         """
         if not self.space.has_rotations:
-            raise InputError(
-                f"{self.path}: holds {self.space.noun} and no skeleton; this needs a corpus of rotations (prepared with"
-                " --pose 6d or exponential)."
-            )
+            remedy = "this needs a corpus of rotations (prepared with --pose 6d or exponential)"
+            raise InputError(f"{self.path}: holds {self.space.noun} and no skeleton; {remedy}.")
 
     def require_pose(self, *kinds: str) -> None:
         """Refuse a corpus of other kinds of poses.
@@ -236,8 +234,8 @@ class Corpus:
             return self._words[("words", "word_starts").index(name)]
         if name == "waveform_start":
             return self._first_samples
-        arrays = {"audio": lambda: self.audio, "pose": lambda: self.pose, "waveform": lambda: self.waveform}
-        return arrays[name]()
+        stored: np.ndarray = getattr(self, name)  # audio, pose or waveform
+        return stored
 
     @cached_property
     def _words(self) -> tuple[Int32[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
