@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--audio", metavar="FILE", help="speech, in any common format")
     parser.add_argument("--out", metavar="DIR", help="folder to write to")
-    parser.add_argument("--settings", action="store_true", help="list the settings of generation, and exit")
+    parser.add_argument("--settings", action="store_true", help="list the sampling settings, and exit")
     clips.add_arguments(parser)
     sampling.add_arguments(parser)
 
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     """Generate, write and print; or list the settings.
 
     Args:
-        extra: settings of generation, such as ``["--temperature", "0.8"]``.
+        extra: sampling settings, such as ``["--temperature", "0.8"]``.
 
     Raises:
         InputError: a run, audio, clip or folder that cannot be used, or flags that do not fit the run.

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def sampling_settings(name: str, flags: list[str]) -> Any:
-    """Settings of generation of a run, changed by flags such as ``["--temperature", "0.8"]``.
+    """Sampling settings of a run, changed by flags such as ``["--temperature", "0.8"]``.
 
     Args:
         name: a run folder, or the name of a shipped run.
