@@ -1,6 +1,9 @@
 """Settings as frozen dataclasses, from JSON and from command-line text."""
 
+import ast
 import dataclasses
+import inspect
+import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
@@ -88,13 +91,34 @@ def parse_flags(pairs: Sequence[str], *owners: Any, hint: str) -> tuple[Any, ...
 
 
 def settings_lines(settings: Any) -> list[str]:
-    """A line for each setting: its flag and value."""
+    """The flag, value and description of each setting, as ``--settings`` prints them."""
+    about = _descriptions(type(settings))
     lines = []
     for field in fields(settings):
         value = getattr(settings, field.name)
-        text = ",".join(map(str, value)) if isinstance(value, tuple) else value
-        lines.append(f"{flag_of(field)} {text}")
+        text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+        lines.append(f"{flag_of(field)} {text.lower() if value is None or isinstance(value, bool) else text}".rstrip())
+        lines += textwrap.wrap(about.get(field.name, ""), 96, initial_indent="    ", subsequent_indent="    ")
     return lines
+
+
+def _descriptions(cls: type) -> dict[str, str]:
+    """The first paragraph of the docstring below each field, where the source is available."""
+    try:
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+    except (OSError, SyntaxError, ValueError):
+        return {}
+    found = {}
+    statements = getattr(body, "body", [])
+    for field, text in zip(statements, statements[1:], strict=False):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+        ):
+            found[field.target.id] = " ".join(str(text.value.value).split("\n\n")[0].split())
+    return found
 
 
 def _parse(text: str, kind: Any, flag: str) -> Any:

@@ -255,6 +255,10 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     assert main(train) == 0
     assert "holds a run already" in fails(capsys, *train)
     assert "other settings (batch_size: 2, now 3" in fails(capsys, *train, "--batch-size", "3", "--resume")
+    # The settings of the run count where no flag is given.
+    capsys.readouterr()
+    assert main([*train[: train.index("--steps")], "--resume"]) == 0
+    assert "trained for 8 steps" in capsys.readouterr().out
     write_audio(tmp_path / "speech.wav", talk(3.7, 5).audio, 16000)
     generate = ["generate", run, "--audio", str(tmp_path / "speech.wav"), "--samples", "2"]
     assert main([*generate, "--out", out]) == 0
@@ -313,3 +317,12 @@ def test_programs_without_a_note_of_their_last_use_are_dropped(tmp_path):
     drop_unfinished(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.txt", "whole-atime", "whole-cache"]
     drop_unfinished(tmp_path / "not there")
+
+
+def test_settings_are_explained(capsys):
+    assert main(["train", "stylized_flow", "--settings"]) == 0
+    shown = capsys.readouterr().out
+    assert "--predictor true\n    Whether the first layer subtracts a linear extrapolation" in shown
+    assert "--steps 4000\n    Training steps" in shown
+    assert main(["generate", "demo-flow", "--settings"]) == 0
+    assert "--temperature 1.0\n    Scale of the latents" in capsys.readouterr().out

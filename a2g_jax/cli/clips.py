@@ -29,23 +29,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pin-blend",
         type=number(float, 0, 10, "a number from 0 to 10"),
         metavar="SECONDS",
-        help="on either side of each (default: 0.75)",
+        help="length of the transitions before and after each (default: 0.75)",
     )
     pin.add_argument(
         "--pin-shared",
         type=share,
         metavar="SHARE",
-        help="of the clip's own shared code beside the audio's (default: 0, as in the paper)",
+        help="weight of the clip's own shared code against the audio's (default: 0, as in the paper)",
     )
     pin.add_argument(
         "--pin-corpus",
         metavar="CORPUS",
-        help="corpus whose 99th percentile of jerk is compared with the seams' (default: the clip's)",
+        help="corpus whose 99th percentile of jerk is compared with the seams' (default: that of the clips and the"
+        " unpinned sample)",
     )
     style = parser.add_argument_group("the style of a clip (runs of stylized_flow)")
     style.add_argument("--style", metavar="CLIP", help="a BVH or NPZ whose style the motions take on")
     style.add_argument("--style-audio", metavar="FILE", help="the clip's own speech (default: silence)")
-    style.add_argument("--style-share", type=share, metavar="SHARE", help="of style beside chance (default: 0.9)")
+    style.add_argument(
+        "--style-share", type=share, metavar="SHARE", help="weight of the style against the random draw (default: 0.9)"
+    )
     style.add_argument(
         "--style-mode",
         choices=("repeat", "statistics"),
@@ -53,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     style.add_argument("--style-with", metavar="CLIP", help="a second clip, to blend the style with")
     style.add_argument("--style-with-audio", metavar="FILE", help="its speech (default: silence)")
-    style.add_argument("--style-mix", type=share, metavar="SHARE", help="of the second clip (default: 0.5)")
+    style.add_argument("--style-mix", type=share, metavar="SHARE", help="weight of the second clip (default: 0.5)")
     style.add_argument(
         "--seed-clip", metavar="CLIP", help="a BVH or NPZ whose last poses are the seed poses of the motions"
     )

@@ -16,7 +16,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g demo``."""
     parser.add_argument("--audio", metavar="FILE", help="your speech (default: a generated one)")
     parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
-    parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write to (default: demo)")
+    parser.add_argument(
+        "--out",
+        default="demo",
+        metavar="DIR",
+        help="folder to write to; files of an earlier call in it are replaced (default: demo)",
+    )
     sampling.add_arguments(parser)
 
 

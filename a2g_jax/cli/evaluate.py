@@ -21,7 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g evaluate``."""
     parser.add_argument("runs", nargs="*", metavar="RUN", help="run folders, demo or demo-flow; none: baselines only")
     parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and .png")
+    parser.add_argument(
+        "--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and, with Matplotlib, .png"
+    )
     parser.add_argument(
         "--features",
         metavar="RUN",
@@ -41,9 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--metric", action="append", metavar="MODULE:NAME", help="a metric of another package; may be repeated"
     )
-    parser.add_argument("--split", default="test", help="of the corpus (default: test)")
+    parser.add_argument("--split", default="test", help="split of the corpus (default: test)")
     parser.add_argument("--samples", type=count, default=20, help="motions of each run for each clip (default: 20)")
-    parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
 
 
 def run(options: argparse.Namespace, _extra: list[str]) -> None:

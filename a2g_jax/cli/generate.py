@@ -20,10 +20,10 @@ TAKES_SETTINGS = True
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g generate``; those of settings are read later, since they depend on the run."""
     parser.add_argument(
-        "run", help="a run folder, or 'demo' or 'demo-flow' for those that are shipped with the package"
+        "run", metavar="RUN", help="a run folder, or 'demo' or 'demo-flow' for those that are shipped with the package"
     )
     parser.add_argument("--audio", metavar="FILE", help="speech, in any common format")
-    parser.add_argument("--out", metavar="DIR", help="folder to write to")
+    parser.add_argument("--out", metavar="DIR", help="folder to write to; files of an earlier call in it are replaced")
     parser.add_argument("--settings", action="store_true", help="list the sampling settings, and exit")
     clips.add_arguments(parser)
     sampling.add_arguments(parser)
@@ -41,7 +41,8 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     existing_run(options.run)
     settings = sampling.sampling_settings(options.run, extra)
     if options.settings:
-        print(f"# {type(settings).__name__}", *settings_lines(settings), sep="\n")
+        lines = settings_lines(settings) or ["none"]
+        print("# sampling settings", *lines, sep="\n")
         return
     for name in ("audio", "out"):
         if getattr(options, name) is None:

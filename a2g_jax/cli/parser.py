@@ -18,10 +18,10 @@ COMMANDS: dict[str, ModuleType] = {
     "talk": talk,
     "prepare": prepare,
     "train": train,
+    "generate": generate,
     "inspect": inspect,
     "evaluate": evaluate,
     "retarget": retarget,
-    "generate": generate,
 }
 
 

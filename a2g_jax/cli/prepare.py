@@ -41,7 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=_reader,
         metavar="NAME",
-        help="talker, a data set (see --list), a reader.py, or package.module:READER",
+        help="folder (WAV and BVH of equal names), talker, a data set (see --list), a reader.py, or"
+        " package.module:READER",
     )
     parser.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
     parser.add_argument("--list", action="store_true", help="list what can be prepared, and exit")

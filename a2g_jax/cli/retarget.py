@@ -7,7 +7,10 @@ from a2g_jax.cli.argument_types import frame_rate
 from a2g_jax.cli.paths import existing_file
 from a2g_jax.errors import InputError
 
-DESCRIPTION = "The motion of one rig on another: any humanoid BVH to any other, or to the body joints models train on."
+DESCRIPTION = (
+    "Transfer a motion from one rig to another: any humanoid BVH to any other, or to the body joints that models train"
+    " on."
+)
 #: Targets other than a file: skeletons with the source's own bones.
 _OWN = ("body", "upper-body")
 

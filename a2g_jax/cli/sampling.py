@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--samples``, ``--seed`` and ``--formats``."""
     known = format_names()
     parser.add_argument("--samples", type=count, default=5, help="number of motions (default: 5)")
-    parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument(
         "--formats",
         type=formats(known),

@@ -8,19 +8,21 @@ from a2g_jax.cli.sampling import print_written
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import talk_formats
 
-DESCRIPTION = "A generated recording, several motions that are right for it, and their ground truth."
+DESCRIPTION = "A generated recording, several valid motions for it, and their ground truth."
 #: Flags that choose a recording to generate, and cannot be combined with one of a corpus.
 _GENERATED = ("seconds", "speaker", "emotion", "fps", "room", "fingers")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g talk``."""
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write to")
+    parser.add_argument(
+        "--out", required=True, metavar="DIR", help="folder to write to; files of an earlier call in it are replaced"
+    )
     parser.add_argument("--seconds", type=number(float, 2, 600, "a number from 2 to 600"), help="length (default: 20)")
     parser.add_argument("--speaker", metavar="NAME", help="the speaker (default: ada)")
     parser.add_argument("--emotion", metavar="NAME", help="the emotion (default: neutral)")
-    parser.add_argument("--seed", type=seed, default=0, help="of the random numbers (default: 0)")
-    parser.add_argument("--samples", type=count, default=5, help="number of right motions (default: 5)")
+    parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
+    parser.add_argument("--samples", type=count, default=5, help="number of valid motions (default: 5)")
     parser.add_argument("--fps", type=frame_rate, help="frames per second (default: 30; 15 with --view beat)")
     parser.add_argument(
         "--sample-rate", type=sample_rate, default=16000, metavar="HZ", help="of the audio (default: 16000)"

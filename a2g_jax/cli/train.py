@@ -1,11 +1,16 @@
 """``a2g train``: train a model on a corpus."""
 
 import argparse
+from pathlib import Path
+from typing import Any
 
 from a2g_jax.cli.paths import existing_corpus, existing_features
-from a2g_jax.config import parse_flags, settings_lines
+from a2g_jax.config import from_json, parse_flags, settings_lines
 from a2g_jax.errors import InputError
+from a2g_jax.models.entry import Entry
 from a2g_jax.models.registry import find_model, model_names
+from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.run_file import RUN_FILE, read_description, split_settings
 
 DESCRIPTION = "Train a model on a corpus. Every setting of the model and the training is a flag too: see --settings."
 #: Further flags are settings.
@@ -28,7 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"
     )
-    parser.add_argument("--resume", action="store_true", help="resume from the latest checkpoint")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="resume from the latest checkpoint with the settings of the run, or start where there is none",
+    )
     parser.add_argument("--settings", action="store_true", help="list every setting with its value, and exit")
 
 
@@ -50,19 +59,24 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
                 raise InputError(f"--{name} is needed (see 'a2g train --help').")
         existing_corpus(options.corpus)
         existing_features(options.features)
-    published = entry.presets[options.preset], entry.training_preset(options.preset)
-    model, training = parse_flags(extra, *published, hint="'a2g train MODEL --settings'")
+    preset, *published = options.preset, entry.presets[options.preset], entry.training_preset(options.preset)
+    stored = None if options.settings or not options.resume else _stored(Path(options.out), options.model, entry)
+    if stored is not None:
+        preset, *published = stored
+    model, training = parse_flags(extra, *published, hint=f"'a2g train {options.model} --settings'")
     if options.settings:
-        for settings in (model, training):
-            print(f"# {type(settings).__name__}", *settings_lines(settings), sep="\n")
+        print("# settings of the model", *settings_lines(model), "", "# settings of the training", sep="\n")
+        print(*settings_lines(training), sep="\n")
         return
+    if options.resume and stored is None:
+        print(f"{options.out}: holds no run to resume; training starts at step 0")
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.training.start import run_training
 
     keep_compilations()
     trained = run_training(
-        options.model, options.preset, model, training, options.corpus, options.out, options.resume, options.features
+        options.model, preset, model, training, options.corpus, options.out, options.resume, options.features
     )
     # A run folder names its model, and code of other packages is imported only by permission.
     allowed = f"A2G_MODELS={options.model} " if ":" in options.model else ""
@@ -72,3 +86,12 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     if trained.config.build().sample is None:
         following = f"{allowed}a2g inspect {options.out}"
     print(f"{options.out}: trained for {trained.steps} steps; next: {following}")
+
+
+def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConfig] | None:
+    """Preset and settings of the run in a folder; None where there is no run of that model."""
+    about = folder / RUN_FILE
+    if not about.is_file() or (values := read_description(folder)).get("model") != model:
+        return None
+    settings: Any = from_json(entry.config, split_settings(entry, values)[0], str(about))
+    return str(values.get("preset")), settings, from_json(TrainConfig, values.get("train_config", {}), str(about))

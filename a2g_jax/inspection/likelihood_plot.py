@@ -56,7 +56,7 @@ def save_likelihood(
     try:
         import matplotlib
     except ImportError:
-        raise InputError("--picture: needs Matplotlib; install it with 'pip install a2g_jax[experiments]'.") from None
+        raise InputError("--picture: needs Matplotlib; install it with 'pip install matplotlib'.") from None
     matplotlib.use("Agg")
     from matplotlib import pyplot
 

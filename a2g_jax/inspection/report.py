@@ -36,6 +36,10 @@ class Report:
         """Number of warnings."""
         return len(warnings_of(self.findings))
 
+    def __str__(self) -> str:
+        """The text of ``a2g inspect``."""
+        return self.text()
+
     def to_json(self) -> dict[str, Any]:
         """The JSON document."""
         document = {
