@@ -65,7 +65,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         recording = request.recording()
     else:
         recording, request = corpus_request(options.corpus, options.recording, request)
-    with progress_bar(options.samples, "gesturing", "motion") as bar:
+    with progress_bar(options.samples, "generating", "motion") as bar:
         written = deliver_talk(
             recording,
             options.out,
