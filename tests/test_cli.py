@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import a2g_jax
 from a2g_jax.cli import main
 from a2g_jax.cli.paths import existing_corpus, existing_file, existing_report, existing_run
 from a2g_jax.compilations import drop_unfinished
@@ -326,3 +327,11 @@ def test_settings_are_explained(capsys):
     assert "--steps 4000\n    Training steps" in shown
     assert main(["generate", "demo-flow", "--settings"]) == 0
     assert "--temperature 1.0\n    Scale of the latents" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("damage", [{"model_config": None}, {"sampling": [1]}, {"model": "os:system"}])
+def test_a_damaged_description_of_a_run_is_named(capsys, tmp_path, damage):
+    values = json.loads((Path(a2g_jax.__file__).parent / "demo" / "run.json").read_text(encoding="utf-8"))
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.json").write_text(json.dumps({**values, **damage}))
+    assert str(tmp_path / "run" / "run.json") in fails(capsys, "generate", str(tmp_path / "run"), "--settings")

@@ -40,7 +40,8 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
     folder = run_folder(name)
     values = read_description(folder)
     entry = find_trained_model(str(values.get("model")), str(folder / RUN_FILE))
-    stored: Any = from_json(entry.sampling, split_settings(entry, values)[1], str(folder / RUN_FILE))
+    about = folder / RUN_FILE
+    stored: Any = from_json(entry.sampling, split_settings(entry, values, about)[1], str(about))
     (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
     return changed
 

@@ -93,5 +93,5 @@ def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConf
     about = folder / RUN_FILE
     if not about.is_file() or (values := read_description(folder)).get("model") != model:
         return None
-    settings: Any = from_json(entry.config, split_settings(entry, values)[0], str(about))
+    settings: Any = from_json(entry.config, split_settings(entry, values, about)[0], str(about))
     return str(values.get("preset")), settings, from_json(TrainConfig, values.get("train_config", {}), str(about))

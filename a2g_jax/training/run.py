@@ -95,7 +95,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             for name in ("audio", "pose", "root")
         }
         entry = find_trained_model(str(values["model"]), str(about))
-        settings, sampling = split_settings(entry, values)
+        settings, sampling = split_settings(entry, values, about)
         config = RunConfig(
             model=values["model"],
             preset=values["preset"],
@@ -130,11 +130,6 @@ def demo_run() -> Run:
     return open_run("demo")
 
 
-def demo_flow_run() -> Run:
-    """The trained flow shipped with the package: ``demo-flow`` on the command line."""
-    return open_run("demo-flow")
-
-
 def open_run(name: str | os.PathLike[str]) -> Run:
     """A run folder, or one of those that are shipped with the package: ``demo`` and ``demo-flow``.
 
@@ -153,7 +148,7 @@ def demo_feature_run() -> tuple[Run, str]:
 def keep_sampling(config: RunConfig, folder: Path) -> RunConfig:
     """The run with the sampling settings of its folder, which may have been changed since it was trained."""
     about = folder / RUN_FILE
-    _, sampling = split_settings(config.entry, read_description(folder))
+    _, sampling = split_settings(config.entry, read_description(folder), about)
     return replace(config, sampling=from_json(config.entry.sampling, sampling, str(about)))
 
 

@@ -48,18 +48,19 @@ def read_description(folder: Path) -> dict[str, Any]:
     return values
 
 
-def split_settings(entry: Entry, values: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+def split_settings(entry: Entry, values: dict[str, Any], about: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Settings of the model and of sampling, which runs of version 0.1 store together.
 
     Args:
         values: the contents of ``run.json``.
+        about: its path, for the error.
 
     Raises:
         InputError: damaged contents.
     """
     settings, sampling = values.get("model_config"), values.get("sampling")
     if not isinstance(settings, dict) or not isinstance(sampling, dict | None):
-        raise InputError(f"{RUN_FILE}: is damaged (model_config or sampling); restore it or train again.")
+        raise InputError(f"{about}: is damaged (model_config or sampling); restore it or train again.")
     if sampling is not None:
         return settings, dict(sampling)
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
