@@ -77,12 +77,13 @@ class Conv1D(nn.Module):
 
 
 class Dense(nn.Module):
-    """A linear layer applied to every frame; Xavier's uniform weights, zero bias."""
+    """A linear layer applied to every frame; Xavier's uniform weights, constant bias."""
 
     features: int
+    initial_bias: float = 0.0
 
     @nn.compact
     def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B T D"]:
         kernel = self.param("kernel", nn.initializers.xavier_uniform(), (x.shape[-1], self.features))
-        bias = self.param("bias", nn.initializers.zeros_init(), (self.features,))
+        bias = self.param("bias", nn.initializers.constant(self.initial_bias), (self.features,))
         return x @ kernel + bias[None, None]

@@ -30,31 +30,11 @@ def frame_normal(
     return noise.reshape(blocks * BLOCK, channels)[:frames]
 
 
-def slow_normal(
-    key: Key[Array, ""], start: Int[Array, ""], frames: int, channels: int, period: int
-) -> Float[Array, "frames channels"]:
-    """Standard normal noise that is redrawn every ``period`` frames, with smooth transitions between draws.
-
-    Between draws a and b it is ``a cos(t) + b sin(t)``, t from 0 to pi / 2: every single frame is standard normal.
-
-    Args:
-        start: any absolute frame; the same frame gets the same values in every window.
-        period: frames between draws; 1 for :func:`frame_normal`, whose ``start`` must be a multiple of 128.
-    """
-    if period == 1:
-        return frame_normal(key, start, frames, channels)
-    number, first = start // period, start % period
-    count = -(-frames // period) + 2
-    keys = jax.vmap(lambda n: jax.random.fold_in(key, n.astype(jnp.uint32)))(number + jnp.arange(count))
-    draws = jax.vmap(lambda k: jax.random.normal(k, (channels,)))(keys)
-    frame = first + jnp.arange(frames)
-    index = frame // period
-    angle = (0.5 * jnp.pi / period * (frame % period))[:, None]
-    return draws[index] * jnp.cos(angle) + draws[index + 1] * jnp.sin(angle)
-
-
 def blended_draws(key: Key[Array, ""], table: Tree, start: Int[Array, ""], frames: int, period: int) -> Tree:
-    """Rows drawn at random from a table, one for every ``period`` frames, blended linearly in between.
+    """Rows drawn at random from a table, one for every ``period`` frames, blended in between with constant variance.
+
+    Between rows a and b it is ``m + (a - m) cos(t) + (b - m) sin(t)``, with m the mean of the table and t from 0 to
+    pi / 2: a frame varies as much as the rows do. A linear blend of independent rows halves the variance half-way.
 
     Args:
         table: a pytree of arrays (N, C); the same row is taken from each.
@@ -73,6 +53,11 @@ def blended_draws(key: Key[Array, ""], table: Tree, start: Int[Array, ""], frame
         return jax.tree.map(lambda a: jnp.broadcast_to(a[row][None], (frames, a.shape[1])), table)
     time = (start + jnp.arange(frames)) / period
     first = jnp.floor(time).astype(jnp.int32)
-    weight = (time - first)[:, None]
+    angle = (0.5 * jnp.pi * (time - first))[:, None]
     low, high = jax.vmap(draw)(first), jax.vmap(draw)(first + 1)
-    return jax.tree.map(lambda a: a[low] * (1 - weight) + a[high] * weight, table)
+
+    def blended(a):
+        mean = jnp.mean(a, axis=0, keepdims=True)
+        return mean + (a[low] - mean) * jnp.cos(angle) + (a[high] - mean) * jnp.sin(angle)
+
+    return jax.tree.map(blended, table)

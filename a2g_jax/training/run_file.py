@@ -23,6 +23,9 @@ SHIPPED_FEATURES = {"demo": "demo_features"}
 #: Sampling settings that runs of version 0.1 kept among those of the model, by their names then.
 _MOVED = {"control_curves": "controls"}
 
+#: Settings of older versions that are gone, with the value at which they had no effect.
+_RETIRED = {"noise_frames": 1}
+
 
 def run_folder(name: str | os.PathLike[str], shipped: dict[str, str] = SHIPPED) -> Path:
     """The folder of a run: a path, or the name of a shipped one."""
@@ -56,13 +59,20 @@ def split_settings(entry: Entry, values: dict[str, Any], about: Path) -> tuple[d
         about: its path, for the error.
 
     Raises:
-        InputError: damaged contents.
+        InputError: damaged contents, or a setting that no longer exists.
     """
     settings, sampling = values.get("model_config"), values.get("sampling")
     if not isinstance(settings, dict) or not isinstance(sampling, dict | None):
         raise InputError(f"{about}: is damaged (model_config or sampling); restore it or train again.")
+    for part in (settings, sampling or {}):
+        for name, default in _RETIRED.items():
+            if part.get(name, default) != default:
+                raise InputError(
+                    f"{about}: has {name} {part[name]}, which only versions up to 0.2 have; train it again."
+                )
+    settings = {name: value for name, value in settings.items() if name not in _RETIRED}
     if sampling is not None:
-        return settings, dict(sampling)
+        return settings, {name: value for name, value in sampling.items() if name not in _RETIRED}
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
     moved = {name: _MOVED.get(str(name), str(name)) for name in settings}
     return (

@@ -87,21 +87,20 @@ def page() -> str:
         lines += ["", "## Codes exchanged between two motions", ""]
         found = json.loads(path.read_text(encoding="utf-8"))["runs"]
         lines += ["S_M of one, I_M of the other:", "", *_exchanged(found, "", "S's", "I's")]
-        lines += [
-            "",
-            "As in generation, S_A of one's speech, and an I_R drawn with the mean and deviation of the other's I_M:",
-        ]
+        lines += ["", "S_A of one's speech, I_M of the other:", "", *_exchanged(found, "audio_", "the speech's", "I's")]
+        lines += ["", "The same with an I_R of the mapping net, of noise with the other's mean and deviation:"]
         lines += ["", *_exchanged(found, "drawn_", "the speech's", "I's")]
     return "\n".join(lines) + "\n"
 
 
 def _exchanged(runs: dict[str, Any], kind: str, first: str, second: str) -> list[str]:
     """Rows with the origin of the hand and of the strokes."""
-    shared = "shared" if not kind else "audio"
-    keys = ("hand_follows_specific", f"strokes_follow_{shared}", "strokes_follow_specific", "strokes_of_a_stranger")
+    keys = ("hand_follows_specific", "strokes_follow_shared", "strokes_follow_specific", "strokes_of_a_stranger")
     head = f"| run | pairs | the hand is {second} | strokes are {first} | strokes are {second} | an unrelated clip's |"
     lines = [head, "|" + " --- |" * 6]
     for name, found in runs.items():
+        if kind + keys[0] not in found:
+            continue
         values = [found[kind + key] for key in keys]
         cells = [f"{one['mean']:.2f} [{one['low']:.2f}, {one['high']:.2f}]" for one in values]
         lines.append(f"| {name} | {found['pairs']} | {' | '.join(cells)} |")

@@ -7,9 +7,8 @@ Of two clips A and B, ``g(S_A, I_B)`` is decoded: the wrist that moves more shou
 and the moments at which a wrist is fast should be A's (the rhythm is in S). Chance is one half for the hand; for the
 times the same is measured against the strokes of a third clip.
 
-An I_M determines nearly everything (the paper's Sec. 6.4), times included, so the same is measured as in generation:
-S_A of A's speech with an I_R that the mapping net makes of noise with the mean and standard deviation of I_B. Writes
-``results/codes.json``.
+The same is measured with S_A of A's speech in place of S_M (``audio_``), and for runs with a mapping net with an I_R
+that it makes of noise with the mean and standard deviation of I_B (``drawn_``). Writes ``results/codes.json``.
 """
 
 import argparse
@@ -34,6 +33,7 @@ FRAMES = 128
 CLEAR = 0.25
 #: Width of the agreement of peaks, seconds.
 SIGMA = 0.1
+_FIGURES = ("hand_follows_specific", "strokes_follow_shared", "strokes_follow_specific", "strokes_of_a_stranger")
 
 
 def clips_of(corpus: Corpus) -> tuple[np.ndarray, np.ndarray]:
@@ -75,51 +75,41 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     pairs = [(a, b) for a, b in zip(left[:count], right[:count], strict=True)]
     pairs += [(b, a) for a, b in pairs]
 
-    @jax.jit
-    def decode(pose_s, pose_i):
-        shared = codec.encode_motion(run.params, pose_s)[0].mean
-        specific = codec.encode_motion(run.params, pose_i)[1]
-        return codec.decode(run.params, codec.to_time(shared), codec.to_time(specific.mean))
+    def specific_of(params, pose):
+        return codec.encode_motion(params, pose)[1].mean
 
     @jax.jit
-    def generate(audio, pose_i):
-        shared = codec.encode_audio(run.params, audio).mean
-        specific = codec.encode_motion(run.params, pose_i)[1]
-        mapped = codec.map_noise(run.params, code_noise(jax.random.key(seed), codec.to_time(specific.mean)))
-        return codec.decode(run.params, codec.to_time(shared), codec.to_time(mapped.mean))
+    def exchanged(params, pose_a, audio_a, pose_b):
+        shared = codec.encode_motion(params, pose_a)[0].mean
+        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(specific_of(params, pose_b)))
 
+    @jax.jit
+    def of_audio(params, pose_a, audio_a, pose_b):
+        shared = codec.encode_audio(params, audio_a).mean
+        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(specific_of(params, pose_b)))
+
+    @jax.jit
+    def drawn(params, pose_a, audio_a, pose_b):
+        shared = codec.encode_audio(params, audio_a).mean
+        mapped = codec.map_noise(params, code_noise(jax.random.key(seed), specific_of(params, pose_b)))
+        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(mapped.mean))
+
+    decodings = {"": exchanged, "audio_": of_audio}
+    if "mapping_net" in run.params:
+        decodings["drawn_"] = drawn
     firsts, seconds = [a for a, _ in pairs], [b for _, b in pairs]
-    made = np.asarray(decode(clips[firsts], clips[seconds]))
-    drawn = np.asarray(generate(features[firsts], clips[seconds]))
     peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
-    hand: list[float] = []
-    own: list[float] = []
-    donor: list[float] = []
-    unrelated: list[float] = []
-    drawn_hand: list[float] = []
-    drawn_own: list[float] = []
-    drawn_donor: list[float] = []
-    drawn_unrelated: list[float] = []
-    swapped = (made, hand, own, donor, unrelated)
-    generated = (drawn, drawn_hand, drawn_own, drawn_donor, drawn_unrelated)
-    for poses, hands, *agreements in (swapped, generated):
+    figures: dict[str, list[float]] = {}
+    for prefix, decode in decodings.items():
+        poses = np.asarray(decode(run.params, clips[firsts], features[firsts], clips[seconds]))
+        rows: dict[str, list[float]] = {name: [] for name in _FIGURES}
         for (a, b), pose in zip(pairs, poses, strict=True):
             ours = wrist_speeds(space, pose, fps)
-            hands.append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
+            rows["hand_follows_specific"].append(float(np.sign(dominance(ours)) == np.sign(sides[b])))
             found = speed_peaks(ours.max(axis=1), fps)
-            third = int(rng.integers(len(clips)))
-            for values, other in zip(agreements, (a, b, third), strict=True):
-                values.append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
-    figures = {
-        "hand_follows_specific": hand,
-        "strokes_follow_shared": own,
-        "strokes_follow_specific": donor,
-        "strokes_of_a_stranger": unrelated,
-        "drawn_hand_follows_specific": drawn_hand,
-        "drawn_strokes_follow_audio": drawn_own,
-        "drawn_strokes_follow_specific": drawn_donor,
-        "drawn_strokes_of_a_stranger": drawn_unrelated,
-    }
+            for name, other in zip(_FIGURES[1:], (a, b, int(rng.integers(len(clips)))), strict=True):
+                rows[name].append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
+        figures |= {prefix + name: values for name, values in rows.items()}
     return {"pairs": len(pairs), **{name: bootstrap_mean(np.array(v), rng)._asdict() for name, v in figures.items()}}
 
 

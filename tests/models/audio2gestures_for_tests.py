@@ -15,6 +15,18 @@ from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.base import Data
 
+#: Codes at the rate of the motion with the papers' mapping net, and their losses on random codes.
+MAPPING = {
+    "specific_frames": 1,
+    "stored_codes": False,
+    "specific_jitter": 0,
+    "smoothing": 0,
+    "adversarial_steps": 0,
+    "relative_losses": False,
+    "relaxed_weight": 1.0,
+    "bicycle_weight": 0.02,
+    "diversity_weight": 0.02,
+}
 CONFIG = replace(
     PRESETS["tiny"],
     audio_channels=(8,),
@@ -30,6 +42,7 @@ CONFIG = replace(
     kl_specific_weight=0.02,
     sampled_rotation_weight=0.5,
     sampled_speed_weight=2.0,
+    **MAPPING,
 )
 BANDS, JOINTS = 5, 5
 SKELETON = Skeleton(
@@ -45,7 +58,7 @@ DATA = Data(
 )
 MODEL = build(CONFIG, DATA)
 TERMS = ("rotation", "position", "speed", "alignment", "kl_shared", "kl_specific", "relaxed")
-TERMS += ("sampled_rotation", "sampled_speed", "bicycle", "diversity")
+TERMS += ("sampled_rotation", "sampled_speed", "bicycle", "bicycle_shared", "diversity", "spread")
 
 
 def make_batch(dtype=np.float32, clips=2, frames=6):

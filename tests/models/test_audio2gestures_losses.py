@@ -126,6 +126,22 @@ class TestValues:
         weighted = losses.relaxed_loss(jnp.asarray(first), jnp.asarray(second), threshold, jnp.asarray(WEIGHTS))
         assert weighted == pytest.approx((beyond[..., 0] + 3 * beyond[..., 2]).mean() / 4)
 
+    def test_free_nats_are_a_floor_for_each_channel(self):
+        mean = np.zeros((2, 4, 5))
+        mean[..., 0], mean[..., 1] = 2.0, 0.1
+        code = Gaussian(jnp.asarray(mean), jnp.zeros((2, 4, 5)))
+        assert losses.kl_loss(code, 0.5) == pytest.approx(2.0 + 4 * 0.5)
+        gradient = jax.grad(lambda m: losses.kl_loss(code._replace(mean=m), 0.5))(code.mean)
+        assert np.abs(gradient[..., 0]).min() > 0
+        np.testing.assert_array_equal(gradient[..., 1:], 0.0)
+
+    def test_spread(self):
+        code = codes(0)
+        expected = np.maximum(1 - np.sqrt(code.var(axis=(0, 1)) + 1e-4), 0).mean()
+        assert on_arrays(losses.spread_loss)(code) == pytest.approx(expected)
+        assert on_arrays(losses.spread_loss)(np.full((2, 4, 5), 3.0)) == pytest.approx(0.99)
+        assert on_arrays(losses.spread_loss)(10 * code) == 0
+
     def test_diversity_rewards_distance(self):
         first, second = positions(0), positions(1)
         assert on_arrays(losses.diversity_loss)(first, second) == pytest.approx(-l1(first, second).mean())
@@ -187,6 +203,11 @@ class TestGradients:
         zero = jnp.zeros((2, 4, 5))
         for gradient in jax.grad(lambda m, v: losses.kl_loss(Gaussian(m, v)), (0, 1))(zero, zero):
             np.testing.assert_array_equal(gradient, zero)
+
+    def test_spread(self):
+        assert_gradient(losses.spread_loss, 0.5 * codes(0))
+        constant = jax.grad(losses.spread_loss)(jnp.ones((2, 4, 5)))
+        assert np.isfinite(constant).all()
 
     def test_relaxed(self):
         first, second = positions(0), positions(1)

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from audio2gestures_for_tests import MAPPING
 from jax.test_util import check_grads
 from scipy.spatial.transform import Rotation
 
@@ -57,6 +58,7 @@ BASE = replace(
     dct_points=FRAMES,
     kl_ramp_steps=0,
     alignment_ramp_steps=0,
+    **MAPPING,
 )
 VARIANTS = {
     "gru": {"backbone": "gru", "recurrent_layers": 2, "recurrent_channels": 3},
@@ -65,6 +67,16 @@ VARIANTS = {
     "no split": {"split": False},
     "no mapping": {"mapping": False},
     "structured": {"stft_weight": 0.5, "ssim_weight": 0.5},
+    "steps": {"specific_frames": 8},
+    "authors": {
+        "initialisation": "normal",
+        "reductions": "authors",
+        "kl_restarts": True,
+        "kl_ramp_steps": 10,
+        "bicycle_shared_weight": 0.1,
+        "diversity_reference": "transfer",
+    },
+    "relative": {"relative_losses": True, "sampled_stft_weight": 0.1, "free_nats": 1e-3},
 }
 
 
@@ -86,7 +98,7 @@ def params_of(model, dtype=np.float32):
     return jax.tree.map(fill, jax.eval_shape(model.init, jax.random.key(0)))
 
 
-@pytest.mark.parametrize("name", ["gru", "transformer", "dct", "no split", "keypoints", "exponential"])
+@pytest.mark.parametrize("name", [*sorted({*VARIANTS, *OTHER_POSES} - {"no mapping", "structured"})])
 def test_every_parameter_learns(name):
     data = OTHER_POSES.get(name, DATA)
     model = build(replace(BASE, **VARIANTS.get(name, {})), data)
@@ -115,7 +127,7 @@ def test_exponential_maps_are_the_rotations_they_stand_for():
     np.testing.assert_array_equal(codec.valid(pose, rotations), pose)
 
 
-@pytest.mark.parametrize("name", ["transformer", "dct", "no split", "no mapping"])
+@pytest.mark.parametrize("name", ["transformer", "dct", "no split", "no mapping", "steps"])
 def test_windows_give_the_motion_of_one_pass(name):
     model = build(replace(BASE, **VARIANTS[name]), DATA)
     params = params_of(model)
@@ -155,7 +167,7 @@ def test_the_shared_code_of_the_dct_space_is_certain_and_the_specific_one_has_a_
     # The shared head is linear, so it is the same in time and in bands.
     alone = codec.encode_motion(params, batch(DATA, 2 * FRAMES).pose[:, FRAMES:])[0]
     np.testing.assert_allclose(shared.mean[:, FRAMES:], alone.mean, atol=1e-5)
-    np.testing.assert_allclose(block_dct(codec.to_time(shared.mean), FRAMES), shared.mean, atol=1e-5)
+    np.testing.assert_allclose(block_dct(codec.to_frames(shared.mean), FRAMES), shared.mean, atol=1e-5)
     with pytest.raises(ValueError, match="multiple of 32 frames"):
         codec.encode_motion(params, batch(DATA, 40).pose)
 
@@ -214,6 +226,16 @@ def test_gradients_of_structured_and_perceptual_losses(x64):
         ({"latent": "dct", "dct_points": 24, "clip_frames": 24}, "divisor of 128"),
         ({"attention_window": 7}, "an even number"),
         ({"recurrent_layers": 0}, "--recurrent-layers: expected 1 or more"),
+        ({"specific_frames": 24}, "--specific-frames: expected a divisor of 128"),
+        ({"specific_frames": 64}, "multiple of --specific-frames 64"),
+        ({"latent": "dct", "specific_frames": 2}, "it needs --specific-frames 1"),
+        ({"stored_codes": True, "split": False}, "--stored-codes: needs --split true"),
+        ({"adversarial_steps": 2, "split": False}, "--adversarial-steps: needs --split true"),
+        ({"adversarial_steps": 2, "latent": "dct"}, "needs --adversarial-steps 0"),
+        ({"smoothing": -1}, "--smoothing: expected 0 or more"),
+        ({"reductions": "mean"}, "--reductions: expected one of paper, authors"),
+        ({"initialisation": "zero"}, "--initialisation: expected one of xavier, normal"),
+        ({"free_nats": -1.0}, "--free-nats: expected 0 or more"),
     ],
 )
 def test_refused(changes, message):
@@ -227,7 +249,7 @@ def test_refused(changes, message):
         ({"edits": ("shared swap 0:3",)}, "from Python only"),
         ({"edits": ("shared blur",)}, "for example"),
         ({"keep_shared": 33}, "there are 32 bands"),
-        ({"noise_frames": 0}, "--noise-frames: expected 1 or more"),
+        ({"redraw_frames": -1}, "--redraw-frames: expected 0 or more"),
     ],
 )
 def test_refused_in_generation(changes, message):

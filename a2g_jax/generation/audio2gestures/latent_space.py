@@ -77,7 +77,7 @@ class LatentSpace:
         def encode(params, pose):
             shared, specific = codec.encode_motion(params, pose[None])
             assert specific is not None
-            return codec.to_time(shared.mean), codec.to_time(specific.mean)
+            return codec.to_frames(shared.mean), codec.specific_to_frames(specific.mean)
 
         self._draw, self._encode = jax.jit(draw), jax.jit(encode)
         self._write = space.from_rotations

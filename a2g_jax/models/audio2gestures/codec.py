@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -12,7 +13,12 @@ from jaxtyping import Array, Float, Key
 from a2g_jax.features.dct import block_idct
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.networks import AudioEncoder, Decoder, Gaussian, MappingNet, MotionEncoder
+from a2g_jax.models.audio2gestures.reductions import Reductions, make_reductions
 from a2g_jax.models.base import Data, Params
+from a2g_jax.nn.rates import interpolated
+
+#: Standard deviation of the authors' initial weights.
+_NORMAL_STD = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +47,7 @@ class Codec:
         """Parameters of all networks, for clips of any length."""
         audio, motion, decoder, mapping = self.modules
         keys = jax.random.split(key, 4)
-        frames = self.config.dct_points if self.config.latent == "dct" else 8
+        frames = self.config.dct_points if self.config.latent == "dct" else 8 * self.config.specific_frames
         sound, pose = jnp.zeros((1, frames, self.data.audio_bands)), jnp.zeros((1, frames, self.width))
         code = jnp.zeros((1, frames, self.config.code_channels))
         params = {
@@ -49,9 +55,9 @@ class Codec:
             "motion_encoder": motion.init(keys[1], pose)["params"],
             "decoder": decoder.init(keys[2], code, code if self.config.split else None)["params"],
         }
-        if self.config.split and self.config.mapping:
+        if self.config.split and self.config.mapping and not self.config.stored_codes:
             params["mapping_net"] = mapping.init(keys[3], code)["params"]
-        return params
+        return _redrawn(key, params) if self.config.initialisation == "normal" else params
 
     def encode_audio(
         self, params: Params, audio: Float[Array, "B T bands"], dropout_key: Key[Array, ""] | None = None
@@ -93,9 +99,19 @@ class Codec:
         mapping: Any = self.modules[3].apply({"params": params["mapping_net"]}, noise)
         return mapping
 
-    def to_time(self, code: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
-        """A code in time, as the decoder takes it."""
+    def to_frames(self, code: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
+        """A shared code in time, as the decoder takes it; also a specific one without steps of several frames."""
         return block_idct(code, self.config.dct_points) if self.config.latent == "dct" else code
+
+    def specific_to_frames(self, steps: Float[Array, "B N C"]) -> Float[Array, "B T C"]:
+        """A motion-specific code in time: its steps interpolated linearly, or its bands transformed back."""
+        return self.to_frames(interpolated(steps, self.config.specific_frames))
+
+    @cached_property
+    def reductions(self) -> Reductions:
+        """How distances of motions and codes become losses."""
+        c = self.config
+        return make_reductions(c.reductions, self.data.space, c.relaxed_threshold, c.free_nats)
 
     @property
     def normalises(self) -> bool:
@@ -130,6 +146,17 @@ class Codec:
             raise ValueError(f"expected a multiple of {points} frames, the length of a DCT block; got {frames}")
         codes = encode(x.reshape(clips * frames // points, points, x.shape[-1]))
         return jax.tree.map(lambda code: code.reshape(clips, frames, -1), codes)
+
+
+def _redrawn(key: Key[Array, ""], params: Params) -> Params:
+    """Parameters with every weight drawn from a normal distribution of standard deviation 0.01; biases stay."""
+    leaves, tree = jax.tree.flatten(params)
+    keys = jax.random.split(key, len(leaves))
+    drawn = [
+        _NORMAL_STD * jax.random.normal(one, leaf.shape, leaf.dtype) if leaf.ndim > 1 else leaf
+        for one, leaf in zip(keys, leaves, strict=True)
+    ]
+    return jax.tree.unflatten(tree, drawn)
 
 
 def _apply(module: nn.Module, params: Params, dropout_key: Key[Array, ""] | None, *inputs: Array | None) -> Any:

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
+from a2g_jax.models.audio2gestures.adversary import adversarial_stage, init_discriminator
 from a2g_jax.models.audio2gestures.codec import Codec as Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
@@ -13,7 +14,7 @@ from a2g_jax.models.audio2gestures.networks import MAPPING_LAYERS, Gaussian
 from a2g_jax.models.audio2gestures.objective import check_objective, terms, total, weights
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
-from a2g_jax.nn.noise import blended_draws, frame_normal, slow_normal
+from a2g_jax.nn.noise import blended_draws, frame_normal
 from a2g_jax.nn.tcn import receptive_halo
 
 #: Frames of context on either side for a GRU, whose memory is unbounded but fades.
@@ -44,11 +45,13 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         return total(values, weighted(step)), values
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """Mean and standard deviation over time of the specific code of every clip in the batch."""
+        """The specific code of every clip, or its mean and standard deviation over time for the mapping net."""
         specific = codec.encode_motion(params, batch.pose)[1]
         if specific is None:
             return {}
-        code = codec.to_time(specific.sample(key))
+        if config.stored_codes:
+            return {"specific_code": specific.mean.astype(jnp.float16)}
+        code = codec.specific_to_frames(specific.sample(key))
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
     def condition(params: Params, summary: Summary, given: Condition) -> Gaussian:
@@ -65,16 +68,26 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
         """The motion g(S_M, I_M) of mean codes."""
         shared, specific = codec.encode_motion(params, batch.pose)
-        time = codec.to_time
-        return codec.decode(params, time(shared.mean), None if specific is None else time(specific.mean))
+        again = None if specific is None else codec.specific_to_frames(specific.mean)
+        return codec.decode(params, codec.to_frames(shared.mean), again)
+
+    stages = [Stage((Update(loss),))]
+    if config.adversarial_steps:
+        stages.append(adversarial_stage(codec))
+
+    def init(key: Key[Array, ""]) -> Params:
+        """Initial parameters of all networks, a discriminator's included."""
+        if not config.adversarial_steps:
+            return codec.init(key)
+        return {**codec.init(key), "discriminator": init_discriminator(jax.random.fold_in(key, 1), codec)}
 
     return Model(
         "audio2gestures",
         config,
         config.clip_frames,
         _halo(config),
-        codec.init,
-        (Stage((Update(loss),)),),
+        init,
+        tuple(stages),
         summarise,
         needs_perceptual=config.lpips_weight > 0,
         condition=condition,
@@ -87,10 +100,8 @@ def check_sampling(config: Audio2GesturesConfig, sampling: Audio2GesturesSamplin
     """Refuse sampling settings that do not apply to a latent space.
 
     Raises:
-        InputError: slow noise for DCT bands, an invalid edit, or one that needs another code.
+        InputError: an invalid edit, or one that needs another code.
     """
-    if config.latent == "dct" and sampling.noise_frames > 1:
-        raise InputError("--noise-frames: bands of the DCT have no order in time; use 1 with a DCT latent space.")
     for edit in sampling.all_edits:
         if parse_edit(edit, config.dct_points).action == "swap":
             raise InputError(f"--edit {edit!r}: takes bands from another code; this is possible from Python only.")
@@ -132,27 +143,53 @@ def draw_codes(
 
 
 def _draw(codec, sampling, params, summary, key, shared, start):
-    """Codes before any edit; I_R from the mapping net, or standard normal without one."""
+    """Codes before any edit; I_R of training clips or of the mapping net, or standard normal without either."""
     config = codec.config
     frames, channels = shared.mean.shape[1:]
     which, noise_key, shared_key, code_key = jax.random.split(key, 4)
     audio_code = shared.mean
     if sampling.sample_codes:
         audio_code = shared.shift(frame_normal(shared_key, start, frames, channels)[None])
-    audio_code = codec.to_time(audio_code)
+    audio_code = codec.to_frames(audio_code)
     if not config.split:
         return audio_code, None
-    noise = sampling.noise_scale * slow_normal(noise_key, start, frames, channels, sampling.noise_frames)
+    size = config.specific_frames
+    if config.stored_codes:
+        steps = _stored(which, summary["specific_code"], sampling, start // size, frames // size, size)
+        return audio_code, codec.specific_to_frames(steps[None])
+    # One draw for each step, that of its first frame: a function of the key and the absolute frame alone.
+    noise = sampling.noise_scale * frame_normal(noise_key, start, frames, channels)[::size]
     if not config.mapping:
-        return audio_code, noise[None]
+        return audio_code, codec.specific_to_frames(noise[None])
     mean, std = blended_draws(
         which, (summary["specific_mean"], summary["specific_std"]), start, frames, sampling.redraw_frames
     )
-    mapped = codec.map_noise(params, (mean + std * noise)[None])
+    # Blending with constant variance may pass zero.
+    mapped = codec.map_noise(params, (mean[::size] + jnp.maximum(std[::size], 0.0) * noise)[None])
     specific = mapped.mean
     if sampling.sample_codes:
-        specific = mapped.shift(frame_normal(code_key, start, frames, channels)[None])
-    return audio_code, codec.to_time(specific)
+        specific = mapped.shift(frame_normal(code_key, start, frames, channels)[None, ::size])
+    return audio_code, codec.specific_to_frames(specific)
+
+
+def _stored(key, codes, sampling, first, count, size):
+    """Steps of the specific code from training clips, each taken from its beginning to its end.
+
+    Args:
+        codes: of training clips, (clips, steps, C).
+        first: number of the first step in the whole audio; may be negative.
+        count: steps.
+        size: frames of a step.
+    """
+    clips, length, _ = codes.shape
+    number = first + jnp.arange(count)
+    # Without redrawing, one clip is followed by the next one of the training split.
+    period = max(1, -(-sampling.redraw_frames // (size * length))) * length if sampling.redraw_frames else 2**20
+    draw = lambda n: jax.random.randint(jax.random.fold_in(key, n.astype(jnp.uint32)), (), 0, clips)  # noqa: E731
+    clip = jax.vmap(draw)(number // period) + (number % period) // length
+    steps = codes[clip % clips, number % length].astype(jnp.float32)
+    mean = jnp.mean(codes.astype(jnp.float32), axis=(0, 1))
+    return mean[None] + sampling.noise_scale * (steps - mean[None])
 
 
 def _halo(config: Audio2GesturesConfig) -> int:
@@ -170,5 +207,7 @@ def _halo(config: Audio2GesturesConfig) -> int:
         mapping = config.dct_points - 1 + MAPPING_LAYERS * (config.kernel_size // 2)
     else:
         mapping = MAPPING_LAYERS * (config.kernel_size // 2)
+    # Interpolation takes one more step.
+    mapping = (mapping + 1) * config.specific_frames if config.specific_frames > 1 else mapping
     # The decoder takes codes from an encoder or from the mapping net; the one that reaches farther counts.
-    return max(reach, mapping) + receptive_halo(len(config.decoder_channels), config.kernel_size)
+    return max(reach, mapping) + receptive_halo(len(config.decoder_channels), config.kernel_size) + config.smoothing

@@ -13,9 +13,19 @@ from a2g_jax.features.similarity import lpips, ssim, stft_distance
 from a2g_jax.models.audio2gestures import losses
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
+from a2g_jax.models.audio2gestures.networks import Gaussian
 from a2g_jax.models.base import Params
+from a2g_jax.nn.rates import shifted
 
 Terms = dict[str, Array]
+
+#: Losses of motions with random codes.
+_OF_RANDOM_CODES = ("relaxed", "sampled_rotation", "sampled_speed", "sampled_stft", "diversity")
+_OF_RANDOM_CODES += ("bicycle", "bicycle_shared")
+#: Smallest share of the KL weights at the beginning of a ramp that restarts, as in the authors' code.
+_LOWEST_RAMP = 1e-4
+#: Added to the losses of a motion that stands still, for batches without any motion.
+_STILL_EPSILON = 1e-6
 
 
 def check_objective(config: Audio2GesturesConfig) -> None:
@@ -33,8 +43,8 @@ def weights(config: Audio2GesturesConfig) -> Callable[[Int[Array, ""]], dict[str
 
     def at(step: Int[Array, ""]) -> dict[str, Any]:
         alignment = jnp.minimum(step / config.alignment_ramp_steps, 1.0) if config.alignment_ramp_steps else 1.0
-        ramp = jnp.minimum(step / config.kl_ramp_steps, 1.0) if config.kl_ramp_steps else 1.0
         decay = jnp.maximum(1.0 - step / config.diversity_decay_steps, 0.0) if config.diversity_decay_steps else 1.0
+        ramp = _kl_ramp(config, step)
         return {
             "rotation": config.rotation_weight,
             "position": config.position_weight,
@@ -43,16 +53,28 @@ def weights(config: Audio2GesturesConfig) -> Callable[[Int[Array, ""]], dict[str
             "ssim": config.ssim_weight,
             "lpips": config.lpips_weight,
             "alignment": config.alignment_weight * alignment,
+            "spread": config.spread_weight,
             "kl_shared": config.kl_shared_weight * ramp,
             "kl_specific": config.kl_specific_weight * ramp,
             "relaxed": config.relaxed_weight,
             "sampled_rotation": config.sampled_rotation_weight,
             "sampled_speed": config.sampled_speed_weight,
+            "sampled_stft": config.sampled_stft_weight,
             "bicycle": config.bicycle_weight,
+            "bicycle_shared": config.bicycle_shared_weight,
             "diversity": config.diversity_weight * decay,
         }
 
     return at
+
+
+def _kl_ramp(config: Audio2GesturesConfig, step: Int[Array, ""]) -> Any:
+    """Share of the KL weights at a step: a linear ramp, once or again and again."""
+    if not config.kl_ramp_steps:
+        return 1.0
+    if config.kl_restarts:
+        return jnp.maximum((step % config.kl_ramp_steps) / config.kl_ramp_steps, _LOWEST_RAMP)
+    return jnp.minimum(step / config.kl_ramp_steps, 1.0)
 
 
 def total(terms: Terms, weighted: dict[str, Any]) -> Float[Array, ""]:
@@ -77,59 +99,105 @@ def terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Te
 
 
 def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
-    config = codec.config
-    keys = jax.random.split(key, 10)
-    drop = list(keys[6:]) if config.dropout > 0 else [None] * 4
-    clips = batch.audio.shape[0]
+    config, reduce = codec.config, codec.reductions
+    keys = jax.random.split(key, 11)
+    drop = list(keys[7:]) if config.dropout > 0 else [None] * 4
 
     audio_shared = codec.encode_audio(params, batch.audio, drop[0])
     motion_shared, motion_specific = codec.encode_motion(params, batch.pose, drop[1])
     assert motion_specific is not None
-    s_audio = codec.to_time(audio_shared.sample(keys[0]))
-    s_motion = codec.to_time(motion_shared.sample(keys[1]))
-    i_motion = codec.to_time(motion_specific.sample(keys[2]))
+    s_audio = codec.to_frames(audio_shared.sample(keys[0]))
+    s_motion = codec.to_frames(motion_shared.sample(keys[1]))
+    steps_motion = motion_specific.sample(keys[2])
+    shifts = _shifts(keys[6], config.specific_jitter, len(batch.pose))
+    in_time = lambda steps: shifted(codec.specific_to_frames(steps), shifts)  # noqa: E731
+    i_motion = in_time(steps_motion)
+    steps_random, mapped = _random_codes(codec, params, keys[3:6], steps_motion)
+    draws = len(steps_random)
 
-    # Two random specific codes for every clip, mapped in one call.
-    kl_specific = losses.kl_loss(motion_specific)
-    if config.mapping:
-        noise = jnp.concatenate([code_noise(keys[3], i_motion), code_noise(keys[4], i_motion)])
-        mapped = codec.map_noise(params, noise)
-        i_random = codec.to_time(mapped.sample(keys[5]))
-        kl_specific = kl_specific + losses.kl_loss(mapped)
-    else:
-        i_random = jax.random.normal(keys[5], (2 * clips, *i_motion.shape[1:]), i_motion.dtype)
-
-    # One large call decodes the four motions: reconstruction, audio to motion, and two random samples.
-    shared = jnp.concatenate([s_motion, s_audio, s_audio, s_audio])
-    specific = jnp.concatenate([i_motion, i_motion, i_random])
+    # One large call decodes all motions: reconstruction, audio to motion, and the random samples.
+    shared = jnp.concatenate([s_motion, *([s_audio] * (1 + draws))])
+    specific = jnp.concatenate([i_motion, i_motion, *(in_time(steps) for steps in steps_random)])
     pose = codec.decode(params, shared, specific, drop[2])
     rotations, places = codec.positions(jnp.concatenate([batch.pose, pose]))
-    target, rebuilt, transferred, sampled, other = jnp.split(places, 5)
-    turns = None if rotations is None else jnp.split(rotations, 5)
+    target, rebuilt, transferred, *sampled = jnp.split(places, 3 + draws)
+    turns = None if rotations is None else jnp.split(rotations, 3 + draws)
 
-    # A valid pose is encoded again: 6D of the rotations, not the raw output.
-    random_pose = codec.valid(pose[2 * clips : 3 * clips], None if turns is None else turns[3])
-    recovered = codec.encode_motion(params, random_pose, drop[3])[1]
-    assert recovered is not None
-
+    clips = len(batch.pose)
     values = _motion_terms(codec, batch.pose, pose[: 2 * clips], turns, target, [rebuilt, transferred])
     values |= {
         "alignment": losses.alignment_loss(s_audio, s_motion),
-        **_shared_kl(config, audio_shared, motion_shared),
-        "kl_specific": kl_specific,
-        "relaxed": losses.relaxed_loss(sampled, target, config.relaxed_threshold),
-        "sampled_speed": losses.speed_loss(sampled, target),
-        "bicycle": losses.bicycle_loss(jax.lax.stop_gradient(i_random[:clips]), codec.to_time(recovered.mean)),
-        "diversity": losses.diversity_loss(sampled, other),
+        "spread": losses.spread_loss(audio_shared.mean) + losses.spread_loss(motion_shared.mean),
+        **_shared_kl(codec, audio_shared, motion_shared),
+        "kl_specific": reduce.kl(motion_specific) + (0.0 if mapped is None else reduce.kl(mapped)),
     }
-    if turns is not None:
-        values["sampled_rotation"] = losses.rotation_loss(turns[3], turns[0])
+    if sampled:
+        turn = None if turns is None else turns[3]
+        values |= _sampled_terms(codec, target, turns, sampled, transferred)
+        # A valid pose is encoded again: 6D of the rotations, not the raw output.
+        again = codec.valid(pose[2 * clips : 3 * clips], turn)
+        shared_again, specific_again = codec.encode_motion(params, again, drop[3])
+        assert specific_again is not None
+        values["bicycle"] = losses.bicycle_loss(
+            jax.lax.stop_gradient(codec.to_frames(steps_random[0])), codec.to_frames(specific_again.mean)
+        )
+        values["bicycle_shared"] = losses.bicycle_loss(
+            jax.lax.stop_gradient(s_audio), codec.to_frames(shared_again.mean)
+        )
     # Not losses: how far codes and motions move. Near zero means that a code has collapsed.
     return values | {
         "reconstruction": losses.position_loss(rebuilt, target),
-        "shared_spread": jnp.mean(jnp.std(codec.to_time(audio_shared.mean), axis=1)),
+        "shared_spread": jnp.mean(jnp.std(codec.to_frames(audio_shared.mean), axis=1)),
         "specific_spread": jnp.mean(jnp.std(motion_specific.mean, axis=(0, 1))),
     }
+
+
+def _shifts(key: Key[Array, ""], most: int, clips: int) -> Int[Array, " B"] | None:
+    """Frames by which the motion-specific code of each clip is shifted; None for no shift at all."""
+    return None if most == 0 else jax.random.randint(key, (clips,), -most, most + 1)
+
+
+def _random_codes(
+    codec: Codec, params: Params, keys: Any, steps: Float[Array, "B N C"]
+) -> tuple[list[Array], Gaussian | None]:
+    """Random specific codes of every clip, two or none if no loss needs them, and their Gaussian, if any.
+
+    Codes of other clips of the batch, or from the mapping net, or from the standard normal distribution.
+    """
+    config = codec.config
+    if config.stored_codes:
+        needed = any(getattr(config, f"{name}_weight") > 0 for name in _OF_RANDOM_CODES)
+        return [jax.lax.stop_gradient(jnp.roll(steps, by, axis=0)) for by in (1, 2)] if needed else [], None
+    if not config.mapping:
+        return [jax.random.normal(key, steps.shape, steps.dtype) for key in keys[1:]], None
+    # DCT bands are mapped from noise with the statistics of the code in time.
+    frames = codec.to_frames(steps)
+    mapped = codec.map_noise(params, jnp.concatenate([code_noise(key, frames) for key in keys[:2]]))
+    return list(jnp.split(mapped.sample(keys[2]), 2)), mapped
+
+
+def _sampled_terms(
+    codec: Codec, target: Array, turns: list[Array] | None, sampled: list[Array], transferred: Array
+) -> Terms:
+    """Losses of motions with a random specific code (Eq. 19 and 21, and the authors' code).
+
+    Args:
+        turns: rotations of the truth, of both reconstructions, and of the samples; None for poses without rotations.
+        sampled: positions of two samples.
+        transferred: positions of g(S_A, I_M).
+    """
+    config, reduce, scale = codec.config, codec.reductions, _scales(codec, target, turns)
+    reference = sampled[1] if config.diversity_reference == "sample" else jax.lax.stop_gradient(transferred)
+    values = {
+        "relaxed": reduce.relaxed(sampled[0], target) / scale["position"],
+        "sampled_speed": reduce.speed(sampled[0], target) / scale["speed"],
+        "diversity": -reduce.position(sampled[0], reference) / scale["position"],
+    }
+    if turns is not None:
+        values["sampled_rotation"] = reduce.rotation(turns[3], turns[0]) / scale["rotation"]
+    if config.sampled_stft_weight > 0:
+        values["sampled_stft"] = jnp.mean(stft_distance(_flat(sampled[0]), _flat(target)))
+    return values
 
 
 def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
@@ -147,15 +215,58 @@ def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     return {
         **_motion_terms(codec, batch.pose, pose, turns, target, [rebuilt, transferred]),
         "alignment": losses.alignment_loss(s_audio, s_motion),
-        **_shared_kl(config, audio_shared, motion_shared),
+        "spread": losses.spread_loss(audio_shared.mean) + losses.spread_loss(motion_shared.mean),
+        **_shared_kl(codec, audio_shared, motion_shared),
         "reconstruction": losses.position_loss(rebuilt, target),
         "shared_spread": jnp.mean(jnp.std(audio_shared.mean, axis=1)),
     }
 
 
-def _shared_kl(config: Audio2GesturesConfig, audio: Any, motion: Any) -> Terms:
+def _shared_kl(codec: Codec, audio: Gaussian, motion: Gaussian) -> Terms:
     """KL divergence of the shared codes; no term for an autoencoder's, which have no variance."""
-    return {} if config.latent == "dct" else {"kl_shared": losses.kl_loss(audio) + losses.kl_loss(motion)}
+    if codec.config.latent == "dct":
+        return {}
+    return {"kl_shared": codec.reductions.kl(audio) + codec.reductions.kl(motion)}
+
+
+def _scales(codec: Codec, target: Array, turns: list[Array] | None) -> dict[str, Any]:
+    """What the motion losses are divided by: 1, or the losses of a motion that stands still in the mean pose.
+
+    Args:
+        target: positions of the truth.
+        turns: its rotations first; None for poses without rotations.
+    """
+    if not codec.config.relative_losses:
+        return {"rotation": 1.0, "position": 1.0, "speed": 1.0}
+    reduce, data = codec.reductions, codec.data
+    mean = jnp.broadcast_to(jnp.asarray(data.pose_statistics.mean)[None, None], (1, 1, *data.space.shape))
+    rotations, places = codec.positions(mean)
+    still = {
+        "position": reduce.position(jnp.broadcast_to(places, target.shape), target),
+        "speed": reduce.speed(jnp.zeros_like(target), target),
+    }
+    if turns is not None and rotations is not None:
+        still["rotation"] = reduce.rotation(jnp.broadcast_to(rotations, turns[0].shape), turns[0])
+    return {name: value + _STILL_EPSILON for name, value in still.items()}
+
+
+def _flat(array: Float[Array, "B T R D"]) -> Float[Array, "B T _"]:
+    return array.reshape(*array.shape[:2], -1)
+
+
+def motion_terms(
+    codec: Codec, truth: Float[Array, "B T R D"], pose: Float[Array, "B2 T R D"]
+) -> tuple[Terms, dict[str, Any]]:
+    """The motion losses of decoded poses against the truth, and their weights.
+
+    Args:
+        pose: raw outputs, twice as many clips as the truth has.
+    """
+    rotations, places = codec.positions(jnp.concatenate([truth, pose]))
+    target, *made = jnp.split(places, 3)
+    turns = None if rotations is None else jnp.split(rotations, 3)
+    terms = _motion_terms(codec, truth, pose, turns, target, made)
+    return terms, {name: getattr(codec.config, f"{name}_weight") for name in terms}
 
 
 def _motion_terms(
@@ -174,16 +285,19 @@ def _motion_terms(
         target: positions of the truth.
         made: positions of both.
     """
-    config = codec.config
+    config, reduce, scale = codec.config, codec.reductions, _scales(codec, target, turns)
     both, twice = jnp.concatenate(made), jnp.concatenate([target, target])
-    values = {"position": losses.position_loss(both, twice), "speed": losses.speed_loss(both, twice)}
+    values = {
+        "position": reduce.position(both, twice) / scale["position"],
+        "speed": reduce.speed(both, twice) / scale["speed"],
+    }
     if turns is not None:
-        values["rotation"] = losses.rotation_loss(jnp.concatenate(turns[1:3]), jnp.concatenate([turns[0]] * 2))
-    flat = lambda array: array.reshape(*array.shape[:2], -1)  # noqa: E731
+        rotation = reduce.rotation(jnp.concatenate(turns[1:3]), jnp.concatenate([turns[0]] * 2))
+        values["rotation"] = rotation / scale["rotation"]
     if config.stft_weight > 0:
-        values["stft"] = jnp.mean(stft_distance(flat(both), flat(twice)))
+        values["stft"] = jnp.mean(stft_distance(_flat(both), _flat(twice)))
     if config.ssim_weight > 0:
-        values["ssim"] = 1.0 - jnp.mean(ssim(flat(both), flat(twice)))
+        values["ssim"] = 1.0 - jnp.mean(ssim(_flat(both), _flat(twice)))
     if config.lpips_weight > 0:
         features = codec.data.perceptual
         assert features is not None

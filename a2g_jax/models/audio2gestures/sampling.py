@@ -10,19 +10,13 @@ class Audio2GesturesSampling:
     """How codes are drawn and edited; the defaults are the papers'."""
 
     noise_scale: float = 1.0
-    """Scale of the noise that becomes the specific code: lower is calmer, 1 is the scale of training."""
-    noise_frames: int = 1
-    """Frames between draws of the noise that enters the mapping net; 1 for independent frames, as in the papers and in
-    training.
-
-    The decoder averages independent noise away; noise that changes every second makes the gestures of samples differ
-    more, and calmer. Used in training, it makes them differ less.
-    """
+    """Scale of the random specific code, or of the noise that becomes it: lower is calmer, 1 is that of training."""
     redraw_frames: int = 0
-    """Frames after which the motion-specific code's statistics are redrawn, with linear blending.
+    """Frames after which the statistics of the mapping net's noise are redrawn, with blending in between.
 
     0 keeps one draw for the whole audio, as the authors do; then a latent choice such as the gesturing hand tends
-    to stay the same throughout a long speech.
+    to stay the same throughout a long speech. With stored codes, frames after which another training clip is drawn,
+    in whole clips; 0 for one clip of the training split after another.
     """
     sample_codes: bool = True
     """Whether codes are drawn from their posteriors, as the authors do; otherwise their means are used (smoother)."""
@@ -35,8 +29,6 @@ class Audio2GesturesSampling:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        if self.noise_frames < 1:
-            raise InputError(f"--noise-frames: expected 1 or more; got {self.noise_frames}.")
         if self.redraw_frames < 0:
             raise InputError(f"--redraw-frames: expected 0 or more; got {self.redraw_frames}.")
         if not 0 <= self.noise_scale < float("inf"):
@@ -55,5 +47,5 @@ class Audio2GesturesSampling:
 
 #: Sampling settings by preset; the papers' for presets that are missing.
 SAMPLING_PRESETS: dict[str, Audio2GesturesSampling] = {
-    "tiny": Audio2GesturesSampling(redraw_frames=128, sample_codes=False),
+    "tiny": Audio2GesturesSampling(redraw_frames=512, sample_codes=False),
 }
