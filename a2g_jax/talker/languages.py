@@ -19,7 +19,7 @@ class Language:
 LANGUAGES: dict[str, Language] = {
     language.name: language
     for language in (
-        Language("en", "English", ("en-gb", "en-us", "en-gb-x-rp", "en-gb-scotland", "en-us-nyc")),
+        Language("en", "English", ("en", "en-us", "en-gb-x-rp", "en-gb-scotland", "en-us-nyc")),
         Language("de", "German", ("de",)),
         Language("es", "Spanish", ("es", "es-419")),
         Language("fr", "French", ("fr", "fr-be", "fr-ch")),

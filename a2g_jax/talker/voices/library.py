@@ -19,7 +19,8 @@ from a2g_jax.errors import InputError
 
 _SYNCHRONOUS = 2
 _PHONEME_EVENTS, _IPA, _RETURN_ERRORS = 0x1, 0x2, 0x8000
-_RATE, _PITCH, _RANGE = 1, 3, 4  # numbers of the parameters
+_RATE, _VOLUME, _PITCH, _RANGE = 1, 2, 3, 4  # numbers of the parameters
+_NO_CLIPPING = 50  # of the usual volume, 100
 _UTF8, _BY_CHARACTER = 1, 1
 _END, _WORD, _PHONEME = 0, 1, 7  # kinds of events
 _SLOWEST, _FASTEST = 80, 350  # words a minute: outside, the durations no longer follow
@@ -132,6 +133,7 @@ class Espeak:
         library.espeak_SetParameter(_RATE, int(np.clip(round(rate), _SLOWEST, _FASTEST)), 0)
         library.espeak_SetParameter(_PITCH, pitch, 0)
         library.espeak_SetParameter(_RANGE, 0, 0)
+        library.espeak_SetParameter(_VOLUME, _NO_CLIPPING, 0)
         encoded = text.encode()
         library.espeak_Synth(encoded, len(encoded) + 1, 0, _BY_CHARACTER, 0, _UTF8, None, None)
         audio = np.concatenate(self._samples or [np.zeros(0, np.int16)]).astype(np.float32) / 32768.0
@@ -142,8 +144,9 @@ def _utterance(
     audio: Float[np.ndarray, " N"], sample_rate: int, events: list[tuple[int, int, int, bytes]]
 ) -> Utterance:
     """Events in seconds; unnamed phonemes are pauses, of which those at the end are left out."""
-    phonemes, words = [], []
-    character, end = 0, 0.0
+    phonemes: list[Phoneme] = []
+    words: list[tuple[int, float]] = []
+    character, end = 0, None
     for kind, position, sample, name in events:
         moment = sample / sample_rate
         if kind == _WORD:
@@ -151,13 +154,15 @@ def _utterance(
             words.append((position, moment))
             continue
         symbol = name.split(b"\0")[0].decode("utf-8", "ignore")
-        if symbol.strip("ˈˌ"):
+        ipa = symbol.strip("ˈˌ-").replace(":", "ː")
+        if ipa:
             stress = 2 if "ˈ" in symbol else 1 if "ˌ" in symbol else 0
-            phonemes.append(Phoneme(symbol.strip("ˈˌ"), stress, moment, character))
-            end = 0.0
-        elif phonemes and end == 0.0:
+            phonemes.append(Phoneme(ipa, stress, moment, character))
+            end = None
+        elif end is None:
             end = moment
-    return Utterance(audio, sample_rate, tuple(phonemes), end or len(audio) / sample_rate, tuple(words))
+    end = len(audio) / sample_rate if end is None else end
+    return Utterance(audio, sample_rate, tuple(phonemes), end, tuple(words))
 
 
 _INSTALL = "pip install 'a2g_jax[voices]'"
