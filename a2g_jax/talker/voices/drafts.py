@@ -12,7 +12,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.talker.languages import Language
 from a2g_jax.talker.plan import AccentClock, draw_pause
 from a2g_jax.talker.voices.library import Espeak, Utterance
-from a2g_jax.talker.voices.sentences import Clause, draw_sentence, function_words
+from a2g_jax.talker.voices.sentences import Clause, divide, draw_sentence, function_words
 from a2g_jax.talker.voices.syllables import SpokenWord, spoken_words
 
 _ACCENT_STRETCH = 0.25  # a full accent makes its syllable longer by this share
@@ -117,6 +117,26 @@ def fill(
             clock.advance(gaps[-1])
     if not placed:
         raise InputError(f"{seconds:.2f} seconds are too short for a sentence.")
+    return _spread(placed, pauses, seconds)
+
+
+def recite(
+    library: Espeak, delivery: Delivery, text: str, seconds: float, clock: AccentClock, rng: np.random.Generator
+) -> list[tuple[float, SpokenClause]]:
+    """Clauses of a given text with their starts, as :func:`fill`.
+
+    Raises:
+        InputError: the text is too long, or has no sentence.
+    """
+    placed, pauses = _say(library, delivery, divide(text), clock, rng)
+    needed = sum(clause.seconds for clause in placed) + sum(pauses[:-1])
+    if not placed or needed > seconds:
+        raise InputError(f"the text needs {needed:.1f} seconds of speech; there are {seconds:.1f}.")
+    return _spread(placed, pauses, seconds)
+
+
+def _spread(placed: list[SpokenClause], pauses: list[float], seconds: float) -> list[tuple[float, SpokenClause]]:
+    """Clauses with their starts; time left over lengthens the pauses."""
     spare = seconds - sum(clause.seconds for clause in placed) - sum(pauses[:-1])
     extra = min(_LONGEST_EXTRA, spare / max(1, len(pauses) - 1))
     steps = [clause.seconds + pause + extra for clause, pause in zip(placed[:-1], pauses[:-1], strict=True)]
@@ -136,14 +156,22 @@ def _next_sentence(
     """A sentence that fits into ``room`` seconds, the pauses after its clauses, and the clock after it; or None."""
     for _ in range(_TRIES):
         later = copy.copy(clock)
-        clauses: list[SpokenClause] = []
-        pauses: list[float] = []
-        for clause in draw_sentence(delivery.language.name, rng, section):
-            if pauses:
-                later.advance(pauses[-1])
-            tempo = math.exp(_CLAUSE_TEMPO * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
-            clauses.append(speak_clause(library, clause, replace(delivery, rate=tempo * delivery.rate), later))
-            pauses.append(draw_pause(rng, clause.ending != "continuation", delivery.pausing))
+        clauses, pauses = _say(library, delivery, draw_sentence(delivery.language.name, rng, section), later, rng)
         if sum(clause.seconds for clause in clauses) + sum(pauses[:-1]) <= room:
             return clauses, pauses, later
     return None
+
+
+def _say(
+    library: Espeak, delivery: Delivery, text: tuple[Clause, ...], clock: AccentClock, rng: np.random.Generator
+) -> tuple[list[SpokenClause], list[float]]:
+    """Spoken clauses and the pause after each; the clock advances, but for the last pause."""
+    clauses: list[SpokenClause] = []
+    pauses: list[float] = []
+    for clause in text:
+        if pauses:
+            clock.advance(pauses[-1])
+        tempo = math.exp(_CLAUSE_TEMPO * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
+        clauses.append(speak_clause(library, clause, replace(delivery, rate=tempo * delivery.rate), clock))
+        pauses.append(draw_pause(rng, clause.ending != "continuation", delivery.pausing))
+    return clauses, pauses

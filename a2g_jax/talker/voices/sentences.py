@@ -46,7 +46,12 @@ def function_words(language: str) -> frozenset[str]:
 def draw_sentence(language: str, rng: np.random.Generator, section: str = "sentence") -> tuple[Clause, ...]:
     """Draw a sentence, divided into clauses. No line of the grammar occurs twice in it while there are others."""
     text = _expand(grammar(language), section, rng, set())
-    clauses = [clause.strip() for clause in _CLAUSE.findall(text[0].upper() + text[1:])]
+    return divide(text[0].upper() + text[1:])
+
+
+def divide(text: str) -> tuple[Clause, ...]:
+    """The clauses of a text that ends with punctuation: what is between commas, stops and marks."""
+    clauses = [clause.strip() for clause in _CLAUSE.findall(text)]
     return tuple(Clause(clause, _ENDINGS.get(clause[-1], "fall")) for clause in clauses)
 
 

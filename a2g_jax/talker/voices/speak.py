@@ -21,7 +21,7 @@ from a2g_jax.talker.prosody import accent_gain, creak_contour, pitch_contour
 from a2g_jax.talker.speakers import SPEAKERS, session_voice
 from a2g_jax.talker.speech import Phrase, PlannedWord, SpeechPlan, Syllable
 from a2g_jax.talker.voice import CREAK_F0, SPEECH_DBFS, active_rms, breath_amplitude, limit_peaks, room_noise
-from a2g_jax.talker.voices.drafts import Delivery, SpokenClause, fill, stressed_syllable
+from a2g_jax.talker.voices.drafts import Delivery, SpokenClause, fill, recite, stressed_syllable
 from a2g_jax.talker.voices.library import espeak
 from a2g_jax.talker.voices.psola import find_marks, revoice
 from a2g_jax.talker.voices.timbre import breath, breathing, tilted
@@ -51,7 +51,13 @@ _PEAK_SECONDS = 0.025
 
 
 def speak(
-    seconds: float, speaker: str, emotion: str, language: str, rng: np.random.Generator, sample_rate: int = 16000
+    seconds: float,
+    speaker: str,
+    emotion: str,
+    language: str,
+    rng: np.random.Generator,
+    sample_rate: int = 16000,
+    text: str | None = None,
 ) -> tuple[SpeechPlan, Float[np.ndarray, " N"]]:
     """Draw what is said and how, and say it; the same arguments give the same speech.
 
@@ -62,13 +68,14 @@ def speak(
         language: a name in :data:`~a2g_jax.talker.languages.LANGUAGES`.
         rng: of everything random.
         sample_rate: of the audio, Hz; the plan does not depend on it.
+        text: sentences to say, with punctuation; None for random ones.
 
     Returns:
         The plan, whose syllables' peaks are where the audio has most energy, and the audio (float32,
         ``round(seconds * sample_rate)`` samples, peak below 1).
 
     Raises:
-        InputError: unknown names, too short, or the extra ``voices`` is missing.
+        InputError: unknown names, too short (also for the text), or the extra ``voices`` is missing.
     """
     nominal, mood = look_up(speaker, emotion)
     if language not in LANGUAGES:
@@ -84,9 +91,11 @@ def speak(
     slack = min(1.0, (seconds - SHORTEST_RECORDING) / 2.0)
     before, after = (0.3 + 0.5 * slack * choices.random(2)).tolist()
     with espeak() as library:
-        clauses = fill(
-            library, delivery, seconds - before - after, AccentClock(accents, mood.accent_density), texts
-        )
+        clock, room = AccentClock(accents, mood.accent_density), seconds - before - after
+        if text is None:
+            clauses = fill(library, delivery, room, clock, texts)
+        else:
+            clauses = recite(library, delivery, text, room, clock, texts)
         synthesizer = f"{library.version}, {delivery.voice}"
         rate = library.sample_rate
     placed = [(before + start, clause) for start, clause in clauses]
@@ -115,11 +124,11 @@ def speak(
     audio = tilted(audio, rate, style.tilt_db_per_octave - _USUAL_TILT + mood.tilt_db_per_octave)
     audio += breath(audio, rate, style.breathiness_db + mood.breathiness_db, noises)
     gain = 10.0 ** (accent_gain(plan, times, level_rng) / 20.0)
-    clock = np.arange(len(audio)) / rate
-    audio *= np.interp(clock, times, gain).astype(np.float32)
+    moments = np.arange(len(audio)) / rate
+    audio *= np.interp(moments, times, gain).astype(np.float32)
     plan = _with_peaks(plan, audio, rate)
     audio *= np.float32(_amplitude(style.loudness_db + mood.loudness_db) / max(active_rms(audio, plan, rate), 1e-9))
-    audio += breathing(np.interp(clock, times, breath_amplitude(plan, times, noises)), rate, noises)
+    audio += breathing(np.interp(moments, times, breath_amplitude(plan, times, noises)), rate, noises)
     return plan, _finished(audio, rate, round(seconds * sample_rate), sample_rate, noises)
 
 
@@ -181,7 +190,10 @@ def _with_peaks(plan: SpeechPlan, audio: Float[np.ndarray, " N"], rate: int) -> 
     energy = uniform_filter1d(np.square(audio, dtype=np.float64), int(_PEAK_SECONDS * rate), mode="constant")
     syllables = []
     for syllable in plan.syllables:
-        low, high = math.ceil(syllable.onset * rate), max(int(syllable.end * rate), math.ceil(syllable.onset * rate) + 1)
+        low, high = (
+            math.ceil(syllable.onset * rate),
+            max(int(syllable.end * rate), math.ceil(syllable.onset * rate) + 1),
+        )
         peak = (low + int(np.argmax(energy[low:high]))) / rate
         syllables.append(replace(syllable, peak=min(max(peak, syllable.onset), syllable.end)))
     return replace(plan, syllables=tuple(syllables))
