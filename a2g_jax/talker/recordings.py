@@ -84,11 +84,12 @@ def talk(
 def _speech(
     seconds: float, seed: int, speaker: str, emotion: str, language: str, sample_rate: int
 ) -> tuple[SpeechPlan, Float[np.ndarray, " N"]]:
-    # With one seed, different speakers say different things, and so do different emotions.
+    # With one seed, different speakers say different things, and so do different emotions and languages.
     role = zlib.crc32(f"{speaker}/{emotion}".encode())
     if language != INVENTED:
         from a2g_jax.talker.voices.speak import speak
 
+        role = zlib.crc32(f"{speaker}/{emotion}/{language}".encode())
         return speak(seconds, speaker, emotion, language, np.random.default_rng([seed, _LANGUAGE, role]), sample_rate)
     plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
     return plan, synthesise(plan, np.random.default_rng([seed, _VOICE, role]), sample_rate)

@@ -169,8 +169,8 @@ def test_peaks_are_where_the_audio_is_loudest():
     for syllable in plan.syllables:
         low, high = np.searchsorted(time, (syllable.onset, syllable.end))
         misses.append(abs(time[low + int(np.argmax(level[low:high]))] - syllable.peak))
-    assert np.median(misses) < 0.012
-    assert np.mean(np.array(misses) < 0.04) > 0.85
+    assert np.median(misses) < 0.005
+    assert np.mean(np.array(misses) < 0.01) > 0.9
 
 
 def test_accents_are_in_energy_and_pitch():

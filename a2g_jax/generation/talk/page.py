@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.recording import Recording
 from a2g_jax.talker.languages import INVENTED, LANGUAGES
-from a2g_jax.talker.speech import plan_from_json
-from a2g_jax.talker.speech import SpeechPlan
+from a2g_jax.talker.speech import SpeechPlan, plan_from_json
 from a2g_jax.talker.truth import GestureTruth
 from a2g_jax.viz.pitch import pitch_curve
 from a2g_jax.viz.player import Bars, Curve, Figure, Hands, Mark, write_page
