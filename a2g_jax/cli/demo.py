@@ -14,9 +14,7 @@ DEMO_MINUTES = 20.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g demo``."""
-    parser.add_argument(
-        "--audio", metavar="FILE", help="your speech (default: an English one of 20 s that comes with the package)"
-    )
+    parser.add_argument("--audio", metavar="FILE", help="your speech (default: a short English one of the package)")
     parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
     parser.add_argument(
         "--out",
