@@ -1,7 +1,8 @@
 """Words and syllables of a spoken clause, from the phonemes' times."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 
 from a2g_jax.talker.voices.library import Phoneme, Utterance
 from a2g_jax.talker.voices.sentences import plain
@@ -10,6 +11,7 @@ _VOWELS = frozenset("iyɨʉɯuɪʏʊeøɘɵɤoəɛœɜɞʌɔæɐaɶɑɒᵻɚɝ")
 _SYLLABIC = "\u0329"
 _LIQUIDS = frozenset("lɫrɹɾʁʀjwɥ")  # may follow an obstruent in an onset
 _OBSTRUENTS = frozenset("pbtdkɡgfvθðβɣ")
+_SHORTEST = 0.004  # seconds of a phone
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,22 @@ def spoken_words(text: str, utterance: Utterance) -> tuple[SpokenWord, ...]:
 
 
 def _touching(words: list[SpokenWord]) -> tuple[SpokenWord, ...]:
-    """The words, each ending where the next starts."""
-    ends = [word.syllables[0].starts[0] for word in words[1:]]
-    joined = []
-    for index, word in enumerate(words):
-        if index < len(ends):
-            last = word.syllables[-1]
-            last = SpokenSyllable(last.phones, last.starts, ends[index], last.vowel, last.stress)
-            word = SpokenWord(word.text, (*word.syllables[:-1], last))
-        joined.append(word)
-    return tuple(joined)
+    """The words, each syllable ending where the next starts, and no phone shorter than :data:`_SHORTEST`.
+
+    The library may start two phonemes at the same moment, or a word's closure with the phoneme before it.
+    """
+    syllables = [syllable for word in words for syllable in word.syllables]
+    bounds = [start for syllable in syllables for start in syllable.starts]
+    bounds += [syllable.end for syllable in syllables[-1:]]
+    for index in range(1, len(bounds)):
+        bounds[index] = max(bounds[index], bounds[index - 1] + _SHORTEST)
+    timed, first = [], 0
+    for syllable in syllables:
+        last = first + len(syllable.starts)
+        timed.append(replace(syllable, starts=tuple(bounds[first:last]), end=bounds[last]))
+        first = last
+    remaining = iter(timed)
+    return tuple(SpokenWord(word.text, tuple(islice(remaining, len(word.syllables)))) for word in words)
 
 
 def _share(texts: list[str], syllables: list[SpokenSyllable]) -> list[SpokenWord]:
