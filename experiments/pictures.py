@@ -18,7 +18,7 @@ from a2g_jax.generation.talk.page import busiest_moments, write_talk_page
 from a2g_jax.generation.talk.request import TalkRequest
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import atomic_path
-from a2g_jax.talker.recordings import plan_from_json
+from a2g_jax.talker.speech import plan_from_json
 from a2g_jax.talker.truth import GestureTruth
 from a2g_jax.viz.player import screenshot_page
 

@@ -11,7 +11,8 @@ from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.files import read_json
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.io.textgrid import read_words
-from a2g_jax.talker.recordings import plan_from_json, resample_motion, talk
+from a2g_jax.talker.recordings import resample_motion, talk
+from a2g_jax.talker.speech import plan_from_json
 from a2g_jax.talker.views.upper_body import UPPER_BODY_JOINTS
 
 #: What one recording of three motions consists of.

@@ -14,7 +14,7 @@ DEMO_MINUTES = 20.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g demo``."""
-    parser.add_argument("--audio", metavar="FILE", help="your speech (default: a generated one)")
+    parser.add_argument("--audio", metavar="FILE", help="your speech (default: a short English one of the package)")
     parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
     parser.add_argument(
         "--out",
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         audio, title = read_audio(options.audio, MelConfig().sample_rate), Path(options.audio).name
     else:
         speech = demo_speech()
-        audio, title, words = speech.audio, "a generated speech", speech.words
+        audio, title, words = speech.audio, "the speech of the demo", speech.words
     trained = _train(Path(options.out)) if options.train else demo_run()
     sampling.write_samples(trained, Generator(trained), audio, options, title, words=words)
 

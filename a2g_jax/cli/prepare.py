@@ -20,7 +20,7 @@ DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: th
 #: The generated corpus, and the data sets of this package.
 READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
-_GENERATED = ("minutes", "speakers", "emotions", "jitter", "fingers", "view", "on_demand")
+_GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
 _RECORDED = ("source", "joints", "random_split", "skip_broken", "limit")
 
 
@@ -76,6 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
     generated.add_argument("--speakers", metavar="NAMES", help="speakers, comma-separated (default: all)")
     generated.add_argument("--emotions", metavar="NAMES", help="emotions, comma-separated (default: all)")
+    generated.add_argument(
+        "--languages",
+        metavar="NAMES",
+        help="in equal shares, any of invented, en, de, es, fr, it (default: invented; others need a2g_jax[voices])",
+    )
     generated.add_argument("--jitter", type=positive, metavar="DEGREES", help="capture noise on the generated motion")
     generated.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the body's 22")
     generated.add_argument(
@@ -124,7 +129,6 @@ def _generated(options: argparse.Namespace) -> "Corpus":
     if options.source is not None:
         raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
     _refuse(options, _RECORDED, "recordings; a generated corpus has the joints of --view and --fingers.")
-    speakers, emotions = _names("speakers", options.speakers), _names("emotions", options.emotions)
 
     from a2g_jax.data.on_demand import OnDemand
     from a2g_jax.data.prepare import prepare_talker, view_poses
@@ -134,16 +138,17 @@ def _generated(options: argparse.Namespace) -> "Corpus":
         raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
     return prepare_talker(
         options.out,
-        _talker_options(options, view, speakers, emotions),
+        _talker_options(options, view),
         _features(options),
         workers=options.workers,
         on_demand=OnDemand() if options.on_demand else None,
     )
 
 
-def _talker_options(
-    options: argparse.Namespace, view: str, speakers: tuple[str, ...], emotions: tuple[str, ...]
-) -> "TalkerOptions":
+def _talker_options(options: argparse.Namespace, view: str) -> "TalkerOptions":
+    speakers, emotions = _names("speakers", options.speakers), _names("emotions", options.emotions)
+    languages = _names("languages", options.languages)
+
     from a2g_jax.data.generated import TalkerOptions
     from a2g_jax.data.settings import find_features
     from a2g_jax.talker.views.catalogue import find_view
@@ -155,6 +160,7 @@ def _talker_options(
         fps=fps,
         speakers=speakers,
         emotions=emotions,
+        languages=languages,
         jitter=options.jitter or 0.0,
         fingers=options.fingers,
         view=view,
@@ -207,7 +213,7 @@ def _refuse(options: argparse.Namespace, names: tuple[str, ...], reason: str) ->
 def _names(flag: str, text: str | None) -> tuple[str, ...]:
     names = tuple(name.strip() for name in (text or "").split(",") if name.strip())
     if text is not None and not names:
-        raise InputError(f"--{flag}: empty list; leave it out for all.")
+        raise InputError(f"--{flag}: empty list; leave it out{'' if flag == 'languages' else ' for all'}.")
     return names
 
 

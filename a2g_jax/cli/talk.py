@@ -10,7 +10,7 @@ from a2g_jax.generation.formats import talk_formats
 
 DESCRIPTION = "A generated recording, several valid motions for it, and their ground truth."
 #: Flags that choose a recording to generate, and cannot be combined with one of a corpus.
-_GENERATED = ("seconds", "speaker", "emotion", "fps", "room", "fingers")
+_GENERATED = ("seconds", "speaker", "emotion", "fps", "room", "fingers", "language")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=number(float, 2, 600, "a number from 2 to 600"), help="length (default: 20)")
     parser.add_argument("--speaker", metavar="NAME", help="the speaker (default: ada)")
     parser.add_argument("--emotion", metavar="NAME", help="the emotion (default: neutral)")
+    parser.add_argument(
+        "--language",
+        metavar="NAME",
+        help="invented, en, de, es, fr or it (default: invented; others need a2g_jax[voices])",
+    )
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument("--samples", type=count, default=5, help="number of valid motions (default: 5)")
     parser.add_argument("--fps", type=frame_rate, help="frames per second (default: 30; 15 with --view beat)")

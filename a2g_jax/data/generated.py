@@ -9,10 +9,12 @@ from a2g_jax.data.featurise import Prepared, prepare_recording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.talker.emotions import VOICE_EMOTIONS
+from a2g_jax.talker.languages import INVENTED, LANGUAGE_NAMES
 from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.talker.views.capture import add_jitter
 from a2g_jax.talker.views.catalogue import find_view
+from a2g_jax.talker.voices.library import library_version
 
 #: Arguments of :func:`~a2g_jax.talker.recordings.talk` for one recording.
 Role: TypeAlias = dict[str, Any]
@@ -38,12 +40,15 @@ class TalkerOptions:
     """The 52 joints with fingers instead of the 22 body joints."""
     view: str = "body"
     """Data set whose format the recordings have: see :data:`~a2g_jax.talker.views.catalogue.VIEWS`."""
+    languages: tuple[str, ...] = ()
+    """Some of :data:`~a2g_jax.talker.languages.LANGUAGE_NAMES`, in equal shares; empty for the invented one."""
 
     def __post_init__(self) -> None:
         find_view(self.view)
         for flag, names, known in (
             ("speakers", self.speakers, SPEAKERS),
             ("emotions", self.emotions, VOICE_EMOTIONS),
+            ("languages", self.languages, LANGUAGE_NAMES),
         ):
             unknown = [name for name in names if name not in known]
             if unknown:
@@ -54,17 +59,43 @@ class TalkerOptions:
             raise InputError(f"--jitter: expected degrees from 0 to 45; got {self.jitter:g}.")
 
     def recipe(self) -> dict[str, Any]:
-        """Settings for the manifest; speakers and emotions by name even if all of them take part."""
-        return {
+        """Settings for the manifest; speakers and emotions by name even if all of them take part.
+
+        Raises:
+            InputError: the extra ``voices`` is missing, which real languages need.
+        """
+        recipe = {
             "reader": "talker",
             **asdict(self),
             "speakers": list(self.speakers or SPEAKERS),
             "emotions": list(self.emotions or VOICE_EMOTIONS),
         }
+        # Recipes without languages are those of versions that had none.
+        del recipe["languages"]
+        if self.languages:
+            recipe["languages"] = list(self.languages)
+        if set(self.languages) - {INVENTED}:
+            recipe["synthesizer"] = library_version()
+        return recipe
 
     def roles(self) -> list[Role]:
         """Arguments of each recording."""
-        return cast(self.minutes, self.seed, self.speakers, self.emotions)
+        return cast(self.minutes, self.seed, self.speakers, self.emotions, self.languages)
+
+
+def check_synthesizer(recipe: dict[str, Any], path: Any) -> None:
+    """Compare the installed library of real languages with the one that a corpus was made with.
+
+    Args:
+        recipe: of the corpus.
+        path: of the corpus, for the message.
+
+    Raises:
+        InputError: another version, which would speak differently, or none.
+    """
+    made = recipe.get("synthesizer")
+    if made is not None and (here := library_version()) != made:
+        raise InputError(f"{path}: was spoken by {made}, here is {here}; install that version or prepare it again.")
 
 
 def generate_rows(role: Role, jitter: float, fingers: bool, view: str, features: Features) -> Prepared:

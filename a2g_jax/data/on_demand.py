@@ -20,7 +20,7 @@ import numpy as np
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_layout import PARTS
 from a2g_jax.data.frame_labels import label_rows, word_rows
-from a2g_jax.data.generated import Role, TalkerOptions, generate_rows
+from a2g_jax.data.generated import Role, TalkerOptions, check_synthesizer, generate_rows
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
 from a2g_jax.data.workers import worker_pool
@@ -182,6 +182,7 @@ def check_generator(corpus: Corpus) -> None:
     Raises:
         InputError: it differs, so generated recordings would not match the stored ones.
     """
+    check_synthesizer(corpus.recipe, corpus.path)
     entry = corpus.recordings[0]
     generated = _generate(corpus.later["stored"][0], arrays=("audio", "pose"), **_settings(corpus))
     audio, pose = generated["audio"], generated["pose"]

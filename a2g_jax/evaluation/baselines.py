@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.generated import check_synthesizer
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
@@ -119,6 +120,7 @@ def right_motions(corpus: Corpus, segment: Segment, samples: int, seed: int) -> 
     if role is None:
         return None
     options: dict[str, Any] = corpus.recipe
+    check_synthesizer(corpus.recipe, corpus.path)
     recording = talk(**role, fps=corpus.fps, sample_rate=corpus.mel.sample_rate, fingers=bool(options["fingers"]))
     entry = corpus.recordings[segment.recording]
     first = segment.start - entry.first

@@ -19,8 +19,7 @@ from a2g_jax.talker.gesture_plan import (
     other_families,
     posture_probabilities,
 )
-from a2g_jax.talker.recordings import plan_from_json
-from a2g_jax.talker.speech import SpeechPlan
+from a2g_jax.talker.speech import SpeechPlan, plan_from_json
 from a2g_jax.talker.styles import FAMILIES, HANDS, GestureStyle, gesture_style
 
 

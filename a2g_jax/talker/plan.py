@@ -16,14 +16,14 @@ SHORTEST_RECORDING = 2.0
 """Shortest recording, seconds: a phrase between two silences."""
 
 _MEAN_SYLLABLE = 0.187  # seconds at stretch 1 (stress, accents and final lengthening included): anchors the rates
-_SHORTEST_PAUSE = 0.2
+SHORTEST_PAUSE = 0.2
 _ROOM_FOR_ANOTHER = 2.2  # seconds: a pause and the shortest phrase
 _SHORTEST_PHRASE, _LONGEST_PHRASE = 0.8, 5.5
 _SHORTEST_ACCENT_GAP = 0.38
 _ACCENT_GAP = 0.42  # seconds between strong accents before they wait for the next stressed syllable
 _HESITATES_FIRST, _HESITATES_LATER = 0.08, 0.012  # chances of a filled pause before a group of words
-_STRENGTH = (0.75, 1.2)  # how strongly an emotion shows: differs from recording to recording
-_TEMPO_SPREAD = 0.05
+EMOTION_STRENGTH = (0.75, 1.2)  # how strongly an emotion shows: differs from recording to recording
+TEMPO_SPREAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,13 @@ class _Draft:
 
 
 def phone_spans(syllable: Syllable) -> tuple[tuple[str, float, float], ...]:
-    """Symbol, start and end (seconds) of each phone of a syllable: vowels stretch most, plosives least."""
+    """Symbol, start and end (seconds) of each phone of a syllable.
+
+    In the invented language, vowels stretch most and plosives least.
+    """
+    if syllable.phone_ends:
+        starts = (syllable.onset, *syllable.phone_ends[:-1])
+        return tuple(zip(syllable.phones, starts, syllable.phone_ends, strict=True))
     phones = [PHONES[symbol] for symbol in syllable.phones]
     rigid = sum(phone.seconds * (1.0 - phone.elasticity) for phone in phones)
     elastic = sum(phone.seconds * phone.elasticity for phone in phones)
@@ -91,7 +97,7 @@ def _time_words(words: list[_Drafted], stretch: float, first_word: int) -> tuple
     return syllables, ends
 
 
-class _AccentClock:
+class AccentClock:
     """Choice of the content words with a strong accent: irregular, about one a second at density 1."""
 
     def __init__(self, rng: np.random.Generator, density: float) -> None:
@@ -122,7 +128,7 @@ def _drafted(rng: np.random.Generator, word: Word, accent: float) -> _Drafted:
 
 
 def _draft_phrase(
-    rng: np.random.Generator, topic: Topic, clock: _AccentClock, seconds: float, stretch: float
+    rng: np.random.Generator, topic: Topic, clock: AccentClock, seconds: float, stretch: float
 ) -> list[_Drafted]:
     """Draw words until they last about ``seconds``, with occasional hesitations before a group of words."""
     words: list[_Drafted] = []
@@ -149,12 +155,12 @@ def _fit(words: list[_Drafted], stretch: float, room: float) -> list[_Drafted]:
     return words
 
 
-def _pause(rng: np.random.Generator, ends_sentence: bool, factor: float) -> float:
+def draw_pause(rng: np.random.Generator, ends_sentence: bool, factor: float) -> float:
     """Draw a pause's length in seconds: 0.2 to 1.3, rarely up to 2.2; longer at the end of a sentence."""
     if rng.random() < 0.05:
         return float(rng.uniform(1.2, 2.2))
     median = 0.68 if ends_sentence else 0.36
-    return float(np.clip(median * factor * math.exp(0.45 * rng.standard_normal()), _SHORTEST_PAUSE, 1.3))
+    return float(np.clip(median * factor * math.exp(0.45 * rng.standard_normal()), SHORTEST_PAUSE, 1.3))
 
 
 def _ending(rng: np.random.Generator) -> str:
@@ -163,7 +169,7 @@ def _ending(rng: np.random.Generator) -> str:
     return "continuation" if draw < 0.5 else "fall" if draw < 0.9 else "question"
 
 
-def _look_up(speaker: str, emotion: str) -> tuple[VoiceStyle, VoiceEmotion]:
+def look_up(speaker: str, emotion: str) -> tuple[VoiceStyle, VoiceEmotion]:
     if speaker not in SPEAKERS:
         raise InputError(f"unknown speaker {speaker!r}: use one of {', '.join(SPEAKERS)}")
     if emotion not in VOICE_EMOTIONS:
@@ -187,17 +193,17 @@ def plan_speech(seconds: float, speaker: str, emotion: str, rng: np.random.Gener
     Raises:
         InputError: unknown speaker or emotion, or too short for a phrase.
     """
-    style, mood = _look_up(speaker, emotion)
+    style, mood = look_up(speaker, emotion)
     if not (math.isfinite(seconds) and seconds >= SHORTEST_RECORDING):
         raise InputError(f"seconds is {seconds}: speech needs at least {SHORTEST_RECORDING:g}")
-    strength = float(rng.uniform(*_STRENGTH))
+    strength = float(rng.uniform(*EMOTION_STRENGTH))
     mood = scaled(mood, strength)
     # A speaker's tempo differs from recording to recording.
-    tempo = math.exp(_TEMPO_SPREAD * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
+    tempo = math.exp(TEMPO_SPREAD * float(np.clip(rng.standard_normal(), -2.0, 2.0)))
     pausing = style.pause_factor * mood.pause_factor * math.exp(0.12 * rng.standard_normal())
     base_stretch = 1.0 / (_MEAN_SYLLABLE * style.syllable_rate * mood.rate_factor * tempo)
     topic = Topic(rng)
-    clock = _AccentClock(rng, mood.accent_density)
+    clock = AccentClock(rng, mood.accent_density)
     slack = min(1.0, (seconds - SHORTEST_RECORDING) / 2.0)  # short recordings get short silences
     starts = [0.3 + 0.5 * slack * float(rng.random())]
     limit = seconds - 0.3 - 0.5 * slack * float(rng.random())
@@ -226,8 +232,8 @@ def plan_speech(seconds: float, speaker: str, emotion: str, rng: np.random.Gener
             continue
         drafts.append(_Draft(words, stretch, _ending(rng)))
         time += length
-        pause = _pause(rng, drafts[-1].ending != "continuation", pausing)
-        pause = max(_SHORTEST_PAUSE, min(pause, limit - time - _SHORTEST_PHRASE))
+        pause = draw_pause(rng, drafts[-1].ending != "continuation", pausing)
+        pause = max(SHORTEST_PAUSE, min(pause, limit - time - _SHORTEST_PHRASE))
         clock.advance(pause)
         time += pause
         starts.append(time)

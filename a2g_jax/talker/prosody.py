@@ -117,11 +117,22 @@ def pitch_contour(
     emotion: VoiceEmotion,
     times: Float[np.ndarray, " T"],
     rng: np.random.Generator,
+    consonants: bool = True,
 ) -> Float[np.ndarray, " T"]:
-    """F0 in Hz at evenly spaced times (seconds). Its median over speech is the speaker's, moved by emotion."""
+    """F0 in Hz at evenly spaced times (seconds). Its median over speech is the speaker's, moved by emotion.
+
+    Args:
+        plan: the speech.
+        style: the speaker's voice.
+        emotion: changes of it.
+        times: where F0 is wanted.
+        rng: of the variation beside the plan.
+        consonants: with the effect of obstruents; only for phones in :data:`~a2g_jax.talker.phones.PHONES`.
+    """
     reach = style.f0_range_semitones * emotion.f0_range_factor * _NEPER_PER_SEMITONE
     log_f0 = _phrase_curve(plan, reach, times, rng) + _accent_curve(plan, reach, times, rng)
-    log_f0 += _consonant_curve(plan, times)
+    if consonants:
+        log_f0 += _consonant_curve(plan, times)
     log_f0 += _WANDER * reach * _slow_noise(len(times), float(times[1] - times[0]), rng)
     spoken = np.zeros(len(times), bool)
     for phrase in plan.phrases:
@@ -178,3 +189,27 @@ def energy_contour(
             boost = ACCENT_DB[0] + ACCENT_DB[1] * syllable.accent
             level[part] += boost * np.exp(-0.5 * (away / np.where(away < 0.0, rise, fall)) ** 2)
     return level
+
+
+def accent_gain(plan: SpeechPlan, times: Float[np.ndarray, " T"], rng: np.random.Generator) -> Float[np.ndarray, " T"]:
+    """Gain in dB for speech that has its own energy: accents raise it as in :func:`energy_contour`, phrases fall.
+
+    Args:
+        plan: the speech.
+        times: increasing, seconds.
+        rng: of the level of phrases.
+    """
+    gain = np.zeros(len(times))
+    for phrase in plan.phrases:
+        part = _between(times, phrase.start, phrase.end)
+        share = (times[part] - phrase.start) / (phrase.end - phrase.start)
+        gain[part] += _PHRASE_DB * rng.standard_normal() + 1.5 - 3.0 * share
+    for syllable in plan.syllables:
+        if syllable.accent > 0.0:
+            peak = syllable.peak
+            rise, fall = max(0.055, 0.6 * (peak - syllable.onset)), max(0.065, 0.4 * (syllable.end - peak))
+            part = _between(times, peak - 4.0 * rise, peak + 4.0 * fall)
+            away = times[part] - peak
+            boost = ACCENT_DB[0] + ACCENT_DB[1] * syllable.accent
+            gain[part] += boost * np.exp(-0.5 * (away / np.where(away < 0.0, rise, fall)) ** 2)
+    return gain

@@ -6,6 +6,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
@@ -13,17 +14,18 @@ from a2g_jax.recording import Recording, Word
 from a2g_jax.talker.augment import augment
 from a2g_jax.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.talker.gestures import gesticulate
+from a2g_jax.talker.languages import INVENTED, LANGUAGE_NAMES
 from a2g_jax.talker.plan import plan_speech
 from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON
 from a2g_jax.talker.speakers import SPEAKERS
-from a2g_jax.talker.speech import Phrase, PlannedWord, SpeechPlan, Syllable
+from a2g_jax.talker.speech import SpeechPlan, plan_from_json, plan_to_json
 from a2g_jax.talker.truth import GestureTruth
 from a2g_jax.talker.voice import synthesise
 
 #: Length of one recording of a corpus, seconds.
 RECORDING_SECONDS = 60.0
 # Streams of a recording's seed; new uses get new numbers, so that old seeds keep their meaning.
-_SPEECH, _VOICE, _MOTION, _CAST, _ROOM = range(5)
+_SPEECH, _VOICE, _MOTION, _CAST, _ROOM, _LANGUAGE = range(6)
 
 
 def talk(
@@ -37,8 +39,9 @@ def talk(
     name: str = "",
     room: bool = False,
     fingers: bool = False,
+    language: str = INVENTED,
 ) -> Recording:
-    """Generate one recording: speech in an invented language, with gestures.
+    """Generate one recording: speech in an invented or a real language, with gestures.
 
     The same arguments always give the same recording. ``annotations`` holds the speech plan under ``"speech"`` and the
     ground truth of the motion under ``"gestures"``.
@@ -50,30 +53,46 @@ def talk(
         emotion: one of :data:`~a2g_jax.talker.emotions.VOICE_EMOTIONS`.
         room: as recorded by a random microphone in a random room with noise, instead of clean.
         fingers: use the skeleton with finger joints; the other joints move the same without.
+        language: one of :data:`~a2g_jax.talker.languages.LANGUAGE_NAMES`; real ones need the extra ``voices``.
 
     Raises:
-        InputError: unknown speaker or emotion, or too short.
+        InputError: unknown speaker, emotion or language, too short, or the extra ``voices`` is missing.
     """
-    for kind, value, known in (("speaker", speaker, SPEAKERS), ("emotion", emotion, VOICE_EMOTIONS)):
+    for kind, value, known in (
+        ("speaker", speaker, SPEAKERS),
+        ("emotion", emotion, VOICE_EMOTIONS),
+        ("language", language, LANGUAGE_NAMES),
+    ):
         if value not in known:
             raise InputError(f"no {kind} {value!r}; there are: {', '.join(known)}.")
-    # With one seed, different speakers say different things, and so do different emotions.
-    role = zlib.crc32(f"{speaker}/{emotion}".encode())
-    plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
+    plan, audio = _speech(seconds, seed, speaker, emotion, language, sample_rate)
     motion, truth = gesticulate(plan, np.random.default_rng([seed, _MOTION]), fps, fingers)
-    audio = synthesise(plan, np.random.default_rng([seed, _VOICE, role]), sample_rate)
     if room:
         audio = augment(audio, sample_rate, np.random.default_rng([seed, _ROOM]))
     return Recording(
-        name=name or f"talker_{seed}_{speaker}_{emotion}",
+        name=name or "_".join(["talker", str(seed), speaker, emotion, *([] if language == INVENTED else [language])]),
         audio=audio,
         sample_rate=sample_rate,
         motion=motion,
         words=tuple(Word(word.text, word.start, word.end) for word in plan.words),
         speaker=speaker,
         emotion=emotion,
-        annotations={"speech": asdict(plan), "gestures": asdict(truth)},
+        annotations={"speech": plan_to_json(plan), "gestures": asdict(truth)},
     )
+
+
+def _speech(
+    seconds: float, seed: int, speaker: str, emotion: str, language: str, sample_rate: int
+) -> tuple[SpeechPlan, Float[np.ndarray, " N"]]:
+    # With one seed, different speakers say different things, and so do different emotions and languages.
+    role = zlib.crc32(f"{speaker}/{emotion}".encode())
+    if language != INVENTED:
+        from a2g_jax.talker.voices.speak import speak
+
+        role = zlib.crc32(f"{speaker}/{emotion}/{language}".encode())
+        return speak(seconds, speaker, emotion, language, np.random.default_rng([seed, _LANGUAGE, role]), sample_rate)
+    plan = plan_speech(seconds, speaker, emotion, np.random.default_rng([seed, _SPEECH, role]))
+    return plan, synthesise(plan, np.random.default_rng([seed, _VOICE, role]), sample_rate)
 
 
 def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTruth]:
@@ -99,25 +118,18 @@ def resample_motion(recording: Recording, key: Any) -> tuple[Motion, GestureTrut
     return gesticulate(plan, np.random.default_rng([_MOTION, 1, *words]), recording.motion.fps, fingers)
 
 
-def plan_from_json(value: dict[str, Any]) -> SpeechPlan:
-    """A speech plan from the dictionary in a recording's annotations."""
-    return SpeechPlan(
-        **{
-            **value,
-            "phrases": tuple(Phrase(**phrase) for phrase in value["phrases"]),
-            "words": tuple(PlannedWord(**word) for word in value["words"]),
-            "syllables": tuple(Syllable(**{**item, "phones": tuple(item["phones"])}) for item in value["syllables"]),
-        }
-    )
-
-
 def cast(
-    minutes: float, seed: int, speakers: tuple[str, ...] = (), emotions: tuple[str, ...] = ()
+    minutes: float,
+    seed: int,
+    speakers: tuple[str, ...] = (),
+    emotions: tuple[str, ...] = (),
+    languages: tuple[str, ...] = (),
 ) -> list[dict[str, Any]]:
     """Speakers, emotions and seeds of a corpus: arguments of :func:`talk` for each recording, about a minute each.
 
     Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording has
-    the sound of a room, so that models trained on the corpus are not limited to studio recordings.
+    the sound of a room, so that models trained on the corpus are not limited to studio recordings. Languages, if any
+    are named, take turns in an order shuffled anew each round; speakers, emotions and seeds do not depend on them.
     """
     speakers, emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
     total = minutes * 60.0
@@ -140,4 +152,9 @@ def cast(
                 "room": index % 2 == 1,
             }
         )
+    if languages:
+        rng = np.random.default_rng([seed, _CAST, _LANGUAGE])
+        rounds = [rng.permutation(len(languages)) for _ in range(0, count, len(languages))]
+        for role, index in zip(roles, np.concatenate(rounds), strict=False):
+            role["language"] = languages[index]
     return roles

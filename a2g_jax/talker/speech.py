@@ -4,7 +4,10 @@ It is everything that the audio determines. Gestures take their timing and size 
 :mod:`a2g_jax.talker.truth`) is drawn from a stream of its own.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from a2g_jax.talker.languages import INVENTED
 
 ENDINGS = ("fall", "continuation", "question")
 """How the melody of a phrase ends: a final fall, a small rise before more of the sentence, or a high rise."""
@@ -26,11 +29,13 @@ class Syllable:
     """Prominence of its pitch accent, 0 (none) to 1 (emphatic): determines whether there is a stroke, and its size."""
     word: int
     """Index into :attr:`SpeechPlan.words`."""
+    phone_ends: tuple[float, ...] = ()
+    """Where each phone ends, in a real language; the invented voice divides the syllable by a rule."""
 
 
 @dataclass(frozen=True)
 class PlannedWord:
-    """One word of the invented language; times in seconds."""
+    """One word, in small letters and without punctuation; times in seconds."""
 
     text: str
     start: float
@@ -64,3 +69,33 @@ class SpeechPlan:
     syllables: tuple[Syllable, ...]
     strength: float = 1.0
     """Strength of the emotion in the voice: multiplies the deviation from neutral."""
+    language: str = INVENTED
+    """Name of a language in :mod:`a2g_jax.talker.languages`."""
+    synthesizer: str = ""
+    """Library and voice of a real language, such as ``"eSpeak NG 1.52.0, en-us+m3"``."""
+
+
+def plan_to_json(plan: SpeechPlan) -> dict[str, Any]:
+    """A plan as a dictionary for annotations and files; what only real languages have is left out of others."""
+    value = asdict(plan)
+    if plan.language == INVENTED:
+        del value["language"], value["synthesizer"]
+        for syllable in value["syllables"]:
+            del syllable["phone_ends"]
+    return value
+
+
+def plan_from_json(value: dict[str, Any]) -> SpeechPlan:
+    """A speech plan from the dictionary in a recording's annotations."""
+    return SpeechPlan(
+        **{
+            **value,
+            "phrases": tuple(Phrase(**phrase) for phrase in value["phrases"]),
+            "words": tuple(PlannedWord(**word) for word in value["words"]),
+            "syllables": tuple(_syllable(item) for item in value["syllables"]),
+        }
+    )
+
+
+def _syllable(value: dict[str, Any]) -> Syllable:
+    return Syllable(**{**value, "phones": tuple(value["phones"]), "phone_ends": tuple(value.get("phone_ends", ()))})

@@ -33,7 +33,7 @@ _AUDIBLE_DB = SILENT + 1.0
 _LEVEL_SECONDS = 0.04
 _BREATH_DBFS = -43.0
 _REFERENCE_HZ = 8000.0  # levels are of the band below it, so that they do not depend on the sample rate
-_CREAK_F0, _CREAK_JITTER, _CREAK_DB = 0.55, 0.07, 2.0
+CREAK_F0, _CREAK_JITTER, _CREAK_DB = 0.55, 0.07, 2.0
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class _Renderer:
             wander = rng.random((len(angle), len(irregular) - high), dtype=np.float32) - np.float32(0.5)
             angle[:, high:] += irregular[high:] * wander
             spectrum *= scale[:, None] * np.exp(1j * angle)
-            _overlap_add(out, fft.irfft(spectrum, grid.n_fft, axis=1), sample)
+            overlap_add(out, fft.irfft(spectrum, grid.n_fft, axis=1), sample)
 
     def noise(
         self,
@@ -137,11 +137,11 @@ class _Renderer:
             spectrum = spectrum_of(part * hop / grid.sample_rate)
             scale = (1.0 / np.sqrt(_band_power(spectrum, grid))).astype(np.float32)
             block = fft.irfft(fft.rfft(white, grid.n_fft, axis=1) * (spectrum * scale[:, None]), grid.n_fft, axis=1)
-            _overlap_add(shaped, block, part * hop - hop)
+            overlap_add(shaped, block, part * hop - hop)
         out += shaped[: len(out)] * amplitude
 
 
-def _overlap_add(out: np.ndarray, blocks: Float[np.ndarray, "P N"], starts: np.ndarray) -> None:
+def overlap_add(out: np.ndarray, blocks: Float[np.ndarray, "P N"], starts: np.ndarray) -> None:
     """Add each block to ``out`` at its start; samples outside are dropped."""
     blocks = blocks.astype(np.float32, copy=False)
     low, high = int(starts.min()), int(starts.max()) + blocks.shape[1]
@@ -170,7 +170,7 @@ def _levelling(voice: np.ndarray, wanted: np.ndarray, sample_rate: int) -> Float
     return np.interp(np.arange(len(voice)), np.arange(len(gain)) * hop, gain).astype(np.float32)
 
 
-def _breaths(plan: SpeechPlan, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def breath_amplitude(plan: SpeechPlan, times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Amplitude (RMS, full scale 1) of inhalations before phrases that follow a long enough pause."""
     amplitude = np.zeros(len(times), np.float32)
     ends = [0.0, *(phrase.end for phrase in plan.phrases)]
@@ -186,7 +186,7 @@ def _breaths(plan: SpeechPlan, times: np.ndarray, rng: np.random.Generator) -> n
     return amplitude
 
 
-def _room(count: int, sample_rate: int, rng: np.random.Generator) -> Float[np.ndarray, " N"]:
+def room_noise(count: int, sample_rate: int, rng: np.random.Generator) -> Float[np.ndarray, " N"]:
     """Soft noise that falls by 3 dB per octave, at :data:`ROOM_DBFS`."""
     size = fft.next_fast_len(count, real=True)
     spectrum = fft.rfft(rng.standard_normal(size, dtype=np.float32))
@@ -195,14 +195,14 @@ def _room(count: int, sample_rate: int, rng: np.random.Generator) -> Float[np.nd
     return noise * np.float32(10.0 ** (ROOM_DBFS / 20.0) / np.sqrt(np.mean(noise**2)))
 
 
-def _limit(audio: np.ndarray) -> np.ndarray:
+def limit_peaks(audio: np.ndarray) -> np.ndarray:
     """Compress peaks above 0.7 so that they stay below 0.99."""
     over = np.abs(audio) > 0.7
     audio[over] = np.sign(audio[over]) * (0.7 + 0.29 * np.tanh((np.abs(audio[over]) - 0.7) / 0.29))
     return audio
 
 
-def _active_rms(audio: np.ndarray, plan: SpeechPlan, sample_rate: int) -> float:
+def active_rms(audio: np.ndarray, plan: SpeechPlan, sample_rate: int) -> float:
     parts = [audio[int(p.start * sample_rate) : int(p.end * sample_rate)] for p in plan.phrases]
     total = sum(float(np.dot(part, part)) for part in parts)
     return math.sqrt(total / max(1, sum(len(part) for part in parts)))
@@ -227,7 +227,7 @@ def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16
     tracks = articulate(plan, emotion, streams[1])
     level = energy_contour(plan, tracks.times, streams[2])
     creak = creak_contour(plan, tracks.times, streams[3])
-    f0 = pitch_contour(plan, style, emotion, tracks.times, streams[4]) * _CREAK_F0**creak
+    f0 = pitch_contour(plan, style, emotion, tracks.times, streams[4]) * CREAK_F0**creak
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (f0[1:] + f0[:-1])) / TRACK_RATE])
     renderer = _Renderer(tracks, level, style, emotion, _Grid.of(sample_rate))
     audio = np.zeros(count, np.float32)
@@ -261,15 +261,15 @@ def synthesise(plan: SpeechPlan, rng: np.random.Generator, sample_rate: int = 16
     renderer.noise(audio, amplitude, frames, hop, frication, streams[6])
 
     wanted = 10.0 ** ((SPEECH_DBFS + style.loudness_db + emotion.loudness_db) / 20.0)
-    audio *= np.float32(wanted / max(_active_rms(audio, plan, sample_rate), 1e-9))
+    audio *= np.float32(wanted / max(active_rms(audio, plan, sample_rate), 1e-9))
 
-    breath = _breaths(plan, tracks.times, streams[7])
+    breath = breath_amplitude(plan, tracks.times, streams[7])
     amplitude = np.interp(clock, tracks.times, breath).astype(np.float32)
     hop = int(0.008 * sample_rate)
     frames = _active_frames(breath > 0.0, count, hop, sample_rate)
     renderer.noise(audio, amplitude, frames, hop, renderer.tract, streams[8])
-    audio += _room(count, sample_rate, streams[8])
-    return _limit(audio)
+    audio += room_noise(count, sample_rate, streams[8])
+    return limit_peaks(audio)
 
 
 def _active_frames(active: np.ndarray, count: int, hop: int, sample_rate: int) -> np.ndarray:

@@ -12,17 +12,17 @@ import sys
 import time
 from pathlib import Path
 
-from experiments.talker import bounds, cost, emotions, hidden, predictable, realism, timing
+from experiments.talker import bounds, cost, emotions, hidden, predictable, realism, timing, voices
 from experiments.talker.common import PICTURES, RESULTS, ROOT, Part, run_part
 
-PARTS = (timing.PART, hidden.PART, predictable.PART, emotions.PART, realism.PART, bounds.PART, cost.PART)
+PARTS = (timing.PART, hidden.PART, predictable.PART, emotions.PART, voices.PART, realism.PART, bounds.PART, cost.PART)
 PAGE = Path(__file__).parent / "README.md"
 _HEAD = """# The generated corpus, measured
 
 Everything below is measured by the modules of this folder and rendered by `python -m experiments.talker --page` from
 the JSON files in `results/`; no number is typed. Run all of it, from the repository root, by
 
-    pip install -e ".[experiments]"
+    pip install -e ".[experiments,voices]"
     python -m experiments.talker
 
 or one part by the command above its tables. The comparison with real takes needs a few small real recordings, which are

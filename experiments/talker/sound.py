@@ -25,18 +25,43 @@ class Voice(NamedTuple):
     """(T,) Hz, NaN where unvoiced (pYIN)."""
 
 
-def analyse(audio: np.ndarray, sample_rate: int) -> Voice:
-    """Mel bands, levels and pitch of a recording at 16 kHz."""
+def analyse(audio: np.ndarray, sample_rate: int, quick: bool = False) -> Voice:
+    """Mel bands, levels and pitch of a recording at 16 kHz; ``quick`` takes the pitch from single frames."""
     frames = int(len(audio) / sample_rate * RATE)
     audio = np.asarray(audio, np.float64) * 10 ** (-active_level_db(np.asarray(audio), sample_rate) / 20)
     band = signal.sosfiltfilt(signal.butter(2, (300, 3000), "band", fs=sample_rate, output="sos"), audio)
-    hop = 160
-    f0, _, _ = librosa.pyin(
-        audio.astype(np.float32), fmin=60, fmax=550, sr=sample_rate, frame_length=1024, hop_length=hop, resolution=0.25
-    )
-    f0 = np.interp(np.arange(frames), np.arange(len(f0)) * hop * RATE / sample_rate, f0)
+    if quick:
+        f0 = frame_pitch(audio, sample_rate, frames)
+    else:
+        hop, limits = 160, {"fmin": 60, "fmax": 550}
+        f0, _, _ = librosa.pyin(
+            audio.astype(np.float32), sr=sample_rate, frame_length=1024, hop_length=hop, resolution=0.25, **limits
+        )
+        f0 = np.interp(np.arange(frames), np.arange(len(f0)) * hop * RATE / sample_rate, f0)
     mel = log_mel(audio.astype(np.float32), MelConfig(sample_rate=sample_rate), RATE, frames)
     return Voice(mel, _level(audio, sample_rate, frames), _level(band, sample_rate, frames), f0)
+
+
+def frame_pitch(audio: np.ndarray, sample_rate: int, frames: int) -> np.ndarray:
+    """(frames,) pitch in Hz at :data:`RATE`, NaN where unvoiced: autocorrelation of 40 ms (Boersma 1993), no path.
+
+    Hundreds of times faster than pYIN; octave errors are rare where voices are clear.
+    """
+    half = int(0.02 * sample_rate)
+    window = np.hanning(2 * half)
+    padded = np.pad(np.asarray(audio, np.float64), half)
+    rows = np.rint(np.arange(frames) / RATE * sample_rate).astype(int)
+    blocks = padded[rows[:, None] + np.arange(2 * half)]
+    blocks = (blocks - blocks.mean(axis=1, keepdims=True)) * window
+    own = np.fft.irfft(np.abs(np.fft.rfft(window, 4 * half)) ** 2)
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(blocks, 4 * half, axis=1)) ** 2, axis=1)
+    lags = np.arange(int(sample_rate / 550), min(int(sample_rate / 70), 2 * half - 1))
+    strength = correlation[:, lags] / np.maximum(correlation[:, :1], 1e-12) / (own[lags] / own[0])
+    # Of equal candidates the highest pitch: an octave lower costs 0.03.
+    best = np.argmax(strength - 0.03 * np.log2(lags / lags[0]), axis=1)
+    loud = correlation[:, 0] > 1e-3 * np.percentile(correlation[:, 0], 95)
+    voiced = loud & (strength[np.arange(frames), best] > 0.5)
+    return np.where(voiced, sample_rate / lags[best], np.nan)
 
 
 def _level(audio: np.ndarray, sample_rate: int, frames: int) -> np.ndarray:

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
-from a2g_jax.talker.recordings import cast, plan_from_json, resample_motion, talk
+from a2g_jax.talker.recordings import cast, resample_motion, talk
+from a2g_jax.talker.speech import plan_from_json
 
 
 @pytest.mark.smoke

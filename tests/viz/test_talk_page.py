@@ -5,7 +5,8 @@ import pytest
 
 from a2g_jax.generation.talk.files import right_motions
 from a2g_jax.generation.talk.page import busiest_moments, gesture_lane, write_talk_page
-from a2g_jax.talker.recordings import plan_from_json, resample_motion, talk
+from a2g_jax.talker.recordings import resample_motion, talk
+from a2g_jax.talker.speech import plan_from_json
 from a2g_jax.viz.pitch import pitch_curve
 from a2g_jax.viz.player import Bars, Curve, Figure, Hands, Mark, write_page
 from tests.viz.figures_for_tests import tone, waving

@@ -16,7 +16,8 @@ from a2g_jax.io.audio import write_audio
 from a2g_jax.io.files import write_json
 from a2g_jax.io.textgrid import write_words
 from a2g_jax.recording import Recording
-from a2g_jax.talker.recordings import plan_from_json, resample_motion
+from a2g_jax.talker.recordings import resample_motion
+from a2g_jax.talker.speech import plan_from_json, plan_to_json
 from a2g_jax.talker.styles import gesture_style
 from a2g_jax.talker.transcript import speech_tiers
 from a2g_jax.talker.truth import GestureTruth
@@ -77,7 +78,7 @@ def deliver_talk(
     if "textgrid" in formats:
         write_words(files.folder / "speech.TextGrid", recording.words, plan.seconds, tiers=speech_tiers(plan))
     if "json" in formats:
-        write_json(files.folder / "speech.json", {**_made(recording, request), "plan": asdict(plan)})
+        write_json(files.folder / "speech.json", {**_made(recording, request), "plan": plan_to_json(plan)})
     shown = []
     for number, (whole, truth) in enumerate(right_motions(recording, samples, request.seed)):
         motion = request.in_view(whole)

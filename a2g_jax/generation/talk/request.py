@@ -6,9 +6,11 @@ from typing import Any
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_layout import Entry
+from a2g_jax.data.generated import check_synthesizer
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.recording import Recording
+from a2g_jax.talker.languages import INVENTED
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.truth import GestureTruth, GestureUnit, PhaseSpan, Stroke
 from a2g_jax.talker.views.upper_body import upper_body
@@ -32,6 +34,7 @@ class TalkRequest:
     fingers: bool = False
     room: bool = False
     view: str = "body"
+    language: str = INVENTED
 
     def recording(self) -> Recording:
         """Generate the recording; its motion is that of the whole body, in no view.
@@ -51,6 +54,7 @@ class TalkRequest:
             sample_rate=self.sample_rate,
             room=self.room,
             fingers=self.fingers or self.view == "beat",
+            language=self.language,
         )
 
     @property
@@ -94,6 +98,7 @@ def corpus_request(
     fingers = bool(corpus.recipe.get("fingers"))
     if request.view == "beat" and not fingers:
         raise InputError(f"{path}: has no fingers, which --view beat shows; prepare it with --fingers.")
+    check_synthesizer(corpus.recipe, path)
     recording = talk(**role, fps=corpus.fps, sample_rate=request.sample_rate, fingers=fingers)
     stored = corpus.annotations(corpus.recordings.index(entry))
     if stored.get("speech", {}).get("words") != list(recording.annotations["speech"]["words"]):
