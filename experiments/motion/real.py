@@ -1,0 +1,63 @@
+"""The same statistics on real speech, beside the people's own motion."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.liveliness import body_of, distance_between
+from experiments.motion.rows import Row
+from experiments.motion.speeches import Speech
+from experiments.motion.statistics import as_json, statistics
+
+#: Row of the person.
+PERSON = "the person"
+#: Standard errors of the null by which agreement has to exceed its mean.
+ABOVE = 2.0
+
+
+def on_take(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
+    """Statistics of one motion or more for one take; intervals are over the motions."""
+    values: dict[str, Any] = statistics([speech] * len(motions), [[motion] for motion in motions])
+    if len(motions) > 1:
+        joints, wrists = distance_between([body_of(motion) for motion in motions])
+        rng = np.random.default_rng(0)
+        values["between_joints"] = as_json(bootstrap_mean(np.array([joints]), rng))
+        values["between_wrists"] = as_json(bootstrap_mean(np.array([wrists]), rng))
+    return {**values, "above_null": above_null(speech, motions)}
+
+
+def above_null(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
+    """Whether agreement exceeds that of the shifted motions: the mean over motions against its standard error."""
+    scores = [speech.agreement(motion) for motion in motions]
+    excess = float(np.mean([one.value - one.null_mean for one in scores]))
+    error = float(np.mean([one.null_std for one in scores])) / np.sqrt(len(scores))
+    z = excess / max(error, 1e-9)
+    return {
+        "z": float(z),
+        "above": bool(z > ABOVE),
+        "samples_above": int(sum(one.value > one.null_mean for one in scores)),
+        "samples": len(scores),
+    }
+
+
+def real_takes(
+    speeches: Sequence[Speech], runs: Callable[[Sequence[Speech]], Sequence[Row]], report: Callable[[], None]
+) -> dict[str, dict[str, Any]]:
+    """For each take: its seconds and the statistics of every row.
+
+    Args:
+        runs: the rows of runs for these speeches.
+    """
+    takes: dict[str, dict[str, Any]] = {}
+    rows = runs(speeches)
+    for number, speech in enumerate(speeches):
+        found = {} if speech.truth is None else {PERSON: on_take(speech, [speech.truth])}
+        for row in rows:
+            assert row.draw is not None
+            found[row.name] = on_take(speech, row.draw(number))
+            report()
+        takes[speech.name] = {"seconds": speech.seconds, "rows": found}
+    return takes
