@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from a2g_jax.metrics.intervals import Interval
 
-Values = Float[np.ndarray, " n"]
+Values = Float[np.ndarray, " _"]
 
 #: Draws of the bootstrap.
 DRAWS = 400

@@ -95,7 +95,7 @@ def make(options: argparse.Namespace) -> None:
     references = {name: rows for name in rows if name != TRUTH and "speed_p50" in rows[name]}
     weights = {row.name: weights_of(run_folder(name)) for name, row in zip(names, runs, strict=True)}
     truth = {name: rows[name] for name in (TRUTH, RIGHT)}
-    real, skipped = real_rows(names, fps) if options.real else ({}, "run with --real.")
+    real, skipped = real_rows(names, fps, options.cache) if options.real else ({}, "run with --real.")
     about = {
         "package": __version__,
         "command": shlex.join(["python", "-m", "experiments.motion", *sys.argv[1:]]),
@@ -159,15 +159,15 @@ def with_old(
     return rows, references
 
 
-def real_rows(names: list[str], fps: float) -> tuple[dict[str, Any], str]:
+def real_rows(names: list[str], fps: float, cache: Path) -> tuple[dict[str, Any], str]:
     """The takes of real speech, and why there are none."""
     folder = shared_folder()
     speeches = real_speeches(folder, fps) if folder.is_dir() else []
     if not speeches:
         return {}, "no recordings in the folder of A2G_SHARED_DATA."
     with progress_bar(len(speeches) * len(names), "real speech", "motion") as bar:
-        made = lambda given: [run_row(name, lambda: list(given), fps, REAL_SAMPLES, 0) for name in names]  # noqa: E731
-        return real_takes(speeches, made, lambda: bar.update()), ""
+        rows = [run_row(name, lambda: speeches, fps, REAL_SAMPLES, 0) for name in names]
+        return real_takes(speeches, rows, cache, lambda: bar.update()), ""
 
 
 def draw_picture(path: Path, rows: Mapping[str, Any], references: Mapping[str, Any]) -> None:

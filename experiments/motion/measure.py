@@ -13,9 +13,19 @@ from a2g_jax.io.files import write_json
 from a2g_jax.metrics.distribution import Features
 from experiments.motion.listening import audit
 from experiments.motion.rows import HALVES, Row
-from experiments.motion.speeches import Speech, Talk, digest, source_digest
+from experiments.motion.speeches import Speech, Talk, code_digest, digest, source_digest
 from experiments.motion.statistics import feature_vectors, fgd, halves, statistics
 from experiments.motion.targets import TRUTH
+
+
+def kept(place: Path, measured: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """The figures in a file, which is written first where it is missing."""
+    if not place.is_file():
+        found = measured()
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_json(place, found)
+    figures: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
+    return figures
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +51,13 @@ class Bench:
     @cached_property
     def identity(self) -> str:
         """Digest of the speeches, the network, the settings and the code of the statistics."""
-        own = [path.read_text(encoding="utf-8") for path in (Path(__file__).parent / name for name in _MEASURING)]
+        own = code_digest([Path(__file__).parent / name for name in _MEASURING])
         return digest(
             self.talk.identity,
             self.network.fingerprint,
             f"{self.samples} {self.seed}",
             source_digest("metrics", "geometry", "evaluation"),
-            *own,
+            own,
         )
 
     def place(self, row: Row) -> Path:
@@ -57,7 +67,7 @@ class Bench:
     def found(self, row: Row) -> dict[str, Any] | None:
         """The figures of a row that was measured before."""
         place = self.place(row)
-        return json.loads(place.read_text(encoding="utf-8")) if place.is_file() else None
+        return kept(place, dict) if place.is_file() else None
 
     def measure(self, row: Row, report: Callable[[], None]) -> dict[str, Any]:
         """The figures of a row; kept on disk.
@@ -65,12 +75,7 @@ class Bench:
         Args:
             report: called after each speech.
         """
-        found = self.found(row)
-        if found is None:
-            found = self._measured(row, report)
-            self.cache.mkdir(parents=True, exist_ok=True)
-            write_json(self.place(row), found)
-        return found
+        return kept(self.place(row), lambda: self._measured(row, report))
 
     def _measured(self, row: Row, report: Callable[[], None]) -> dict[str, Any]:
         if row.draw is None:
@@ -97,4 +102,4 @@ class Bench:
 
 
 #: Files of this folder that determine the figures.
-_MEASURING = ("measure.py", "rows.py", "statistics.py", "speeches.py", "listening.py", "resampling.py")
+_MEASURING = ("rows.py", "statistics.py", "speeches.py", "listening.py", "resampling.py")

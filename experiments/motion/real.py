@@ -1,6 +1,8 @@
 """The same statistics on real speech, beside the people's own motion."""
 
+import hashlib
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,8 +10,9 @@ import numpy as np
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.liveliness import body_of, distance_between
+from experiments.motion.measure import kept
 from experiments.motion.rows import Row
-from experiments.motion.speeches import Speech
+from experiments.motion.speeches import Speech, code_digest, digest, source_digest
 from experiments.motion.statistics import as_json, statistics
 
 #: Row of the person.
@@ -44,20 +47,29 @@ def above_null(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
 
 
 def real_takes(
-    speeches: Sequence[Speech], runs: Callable[[Sequence[Speech]], Sequence[Row]], report: Callable[[], None]
+    speeches: Sequence[Speech], rows: Sequence[Row], cache: Path, report: Callable[[], None]
 ) -> dict[str, dict[str, Any]]:
-    """For each take: its seconds and the statistics of every row.
+    """For each take: its seconds and the statistics of every row, kept on disk as soon as they are measured.
 
     Args:
-        runs: the rows of runs for these speeches.
+        rows: runs for these speeches.
+        cache: folder of the figures.
     """
+    code = digest(
+        code_digest([Path(__file__).parent / name for name in ("real.py", "statistics.py", "resampling.py")]),
+        source_digest("metrics", "geometry"),
+    )
     takes: dict[str, dict[str, Any]] = {}
-    rows = runs(speeches)
     for number, speech in enumerate(speeches):
-        found = {} if speech.truth is None else {PERSON: on_take(speech, [speech.truth])}
+        audio = hashlib.sha256(np.ascontiguousarray(speech.audio).tobytes()).hexdigest()
+        found: dict[str, Any] = {}
+        if speech.truth is not None:
+            place = cache / f"{digest(code, audio, PERSON)}.json"
+            found[PERSON] = kept(place, lambda speech=speech: on_take(speech, [speech.truth]))
         for row in rows:
             assert row.draw is not None
-            found[row.name] = on_take(speech, row.draw(number))
+            place = cache / f"{digest(code, audio, row.identity)}.json"
+            found[row.name] = kept(place, lambda s=speech, row=row, n=number: on_take(s, row.draw(n)))
             report()
         takes[speech.name] = {"seconds": speech.seconds, "rows": found}
     return takes

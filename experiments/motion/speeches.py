@@ -1,8 +1,9 @@
 """Speeches of the table: held-out generated talk, and real recordings."""
 
+import ast
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -159,5 +160,9 @@ def digest(*parts: str) -> str:
 def source_digest(*rooms: str) -> str:
     """Hash of the code of packages of ``a2g_jax``: figures are measured again when it changes."""
     root = Path(a2g_jax.__file__).parent
-    files = [path for room in rooms for path in sorted((root / room).rglob("*.py"))]
-    return digest(*(f"{path.relative_to(root)} {path.read_text(encoding='utf-8')}" for path in files))
+    return code_digest([path for room in rooms for path in sorted((root / room).rglob("*.py"))])
+
+
+def code_digest(files: Sequence[Path]) -> str:
+    """Hash of source files without their comments and formatting."""
+    return digest(*(f"{path.name} {ast.dump(ast.parse(path.read_text(encoding='utf-8')))}" for path in files))
