@@ -42,7 +42,7 @@ def relative_picture(path: Path, rows: Rows, references: Mapping[str, Rows]) -> 
             if value is None:
                 continue
             at, run = float(np.clip(value / scale, LOW, HIGH)), number - len(baselines)
-            style: dict[str, Any] = {"marker": "o", "color": _GREY, "s": 22, "zorder": 2}
+            style: dict[str, Any] = {"marker": "o", "color": _GREY, "s": 36, "zorder": 2}
             offset = -0.27
             if run >= 0:
                 style = {"marker": _MARKERS[run % 7], "color": _COLOURS[run % 7], "s": 48, "zorder": 3}
