@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,11 @@ def on_take(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
         values["between_joints"] = as_json(bootstrap_mean(np.array([joints]), rng))
         values["between_wrists"] = as_json(bootstrap_mean(np.array([wrists]), rng))
     return {**values, "above_null": above_null(speech, motions)}
+
+
+def _run_on_take(row: Row, speech: Speech, number: int) -> dict[str, Any]:
+    assert row.draw is not None
+    return on_take(speech, row.draw(number))
 
 
 def above_null(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
@@ -65,11 +71,10 @@ def real_takes(
         found: dict[str, Any] = {}
         if speech.truth is not None:
             place = cache / f"{digest(code, audio, PERSON)}.json"
-            found[PERSON] = kept(place, lambda speech=speech: on_take(speech, [speech.truth]))
+            found[PERSON] = kept(place, partial(on_take, speech, [speech.truth]))
         for row in rows:
-            assert row.draw is not None
             place = cache / f"{digest(code, audio, row.identity)}.json"
-            found[row.name] = kept(place, lambda s=speech, row=row, n=number: on_take(s, row.draw(n)))
+            found[row.name] = kept(place, partial(_run_on_take, row, speech, number))
             report()
         takes[speech.name] = {"seconds": speech.seconds, "rows": found}
     return takes
