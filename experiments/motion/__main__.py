@@ -12,8 +12,6 @@ changed.
 import argparse
 import json
 import os
-import shlex
-import sys
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -98,7 +96,7 @@ def make(options: argparse.Namespace) -> None:
     real, skipped = real_rows(names, fps, options.cache) if options.real else ({}, "run with --real.")
     about = {
         "package": __version__,
-        "command": shlex.join(["python", "-m", "experiments.motion", *sys.argv[1:]]),
+        "command": command(options),
         "source": source,
         "speeches": len(talk.roles),
         "minutes": sum(role["seconds"] for role in talk.roles) / 60,
@@ -125,6 +123,13 @@ def make(options: argparse.Namespace) -> None:
     print(text)
     if options.strips:
         draw_strips(options, bench, names, fps)
+
+
+def command(options: argparse.Namespace) -> str:
+    """The command without folders of this machine."""
+    flags = [f"--features {options.features}"] if options.features != "demo" else []
+    flags += [f"--{name}" for name in ("real", "strips") if getattr(options, name)]
+    return " ".join(["python -m experiments.motion", *(Path(run).name for run in options.runs), *flags])
 
 
 def measure(bench: Bench, rows: list[Row]) -> dict[str, dict[str, Any]]:
