@@ -21,10 +21,17 @@ def speech_envelope(
     Args:
         smoothing: standard deviation of the Gaussian window, seconds.
     """
-    power = ndimage.gaussian_filter1d(np.square(audio, dtype=np.float64), smoothing * sample_rate, mode="constant")
+    power = _smooth(np.square(audio, dtype=np.float64), smoothing * sample_rate)
     samples = np.minimum(np.rint(np.arange(frames) * sample_rate / fps).astype(int), len(audio) - 1)
     decibels = 10 * np.log10(power[samples] + 1e-12)
     return np.maximum(decibels, decibels.max() - 50)
+
+
+def _smooth(values: Float[np.ndarray, " N"], deviation: float) -> Float[np.ndarray, " N"]:
+    """Non-negative values smoothed by a Gaussian, zero outside; by FFT, since the window has thousands of samples."""
+    radius = round(4.0 * deviation)
+    window = np.exp(-0.5 * np.square(np.arange(-radius, radius + 1) / deviation))
+    return np.maximum(signal.oaconvolve(values, window / window.sum(), mode="full")[radius : radius + len(values)], 0.0)
 
 
 def energy_peaks(envelope: Float[np.ndarray, " T"], fps: float, prominence: float = 3.0) -> Float[np.ndarray, " P"]:
@@ -97,10 +104,25 @@ def agreement_with_null(
         lead: seconds from a stroke's fastest moment to its syllable's peak.
         shifts: seconds; by default 34 from -5 to -1 and 1 to 5.
     """
+    envelope = speech_envelope(audio, sample_rate, motion.fps, motion.frames)
+    return shifted_agreement(motion, energy_peaks(envelope, motion.fps), sigma=sigma, lead=lead, shifts=shifts)
+
+
+def shifted_agreement(
+    motion: Motion,
+    speech: Float[np.ndarray, " S"],
+    *,
+    sigma: float = 0.1,
+    lead: float = 0.1,
+    shifts: Float[np.ndarray, " K"] | None = None,
+) -> Agreement:
+    """:func:`agreement_with_null` for peaks of energy that have been found before.
+
+    Args:
+        speech: times from :func:`energy_peaks`, seconds.
+    """
     if shifts is None:
         shifts = np.concatenate([np.linspace(-5, -1, 17), np.linspace(1, 5, 17)])
-    envelope = speech_envelope(audio, sample_rate, motion.fps, motion.frames)
-    speech = energy_peaks(envelope, motion.fps)
     moves = speed_peaks(wrist_speed(motion), motion.fps)
     scores = [agreement((moves + shift) % motion.seconds, speech, sigma, lead) for shift in shifts]
     return Agreement(

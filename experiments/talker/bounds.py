@@ -25,7 +25,7 @@ from experiments.talker.common import Part, cast_evenly, parallel, run_part, tab
 
 _WRISTS = [BODY_JOINTS.index("L_Wrist"), BODY_JOINTS.index("R_Wrist")]
 SIGMA = 0.1
-#: Seconds from a stroke's fastest moment to its syllable's energy peak, as in `experiments.first_light`.
+#: Seconds from a stroke's fastest moment to its syllable's energy peak, as in `experiments.motion`.
 LEAD = 0.15
 DISTANCES = {
     "wrists, mean distance, cm": "wrists",
