@@ -91,8 +91,8 @@ def check_separate(runs: Mapping[str, Run], network: FeatureNetwork | None) -> N
 
 def trained_against(config: RunConfig, network: FeatureNetwork) -> bool:
     """Whether a loss of a run uses the network: the same weights, by their hash."""
-    used = config.build().needs_perceptual and config.perceptual is not None
-    return used and config.perceptual.fingerprint == network.fingerprint
+    used = config.perceptual if config.build().needs_perceptual else None
+    return used is not None and used.fingerprint == network.fingerprint
 
 
 def vectors_of(frames: Sequence[int], clip_frames: int, where: str) -> tuple[int, int]:
@@ -109,8 +109,8 @@ def vectors_of(frames: Sequence[int], clip_frames: int, where: str) -> tuple[int
     counts = [count // clip_frames for count in frames]
     if sum(counts) < 2:
         raise InputError(
-            f"{where}: its {len(frames)} clips of at most {max(frames)} frames give {sum(counts)} feature vectors, of"
-            f" {clip_frames} frames each, but FGD needs two or more; prepare longer recordings, train a network"
-            " with smaller --clip-frames, or leave out --features."
+            f"{where}: feature vectors are of {clip_frames} frames, and in clips of at most {max(frames)} there are"
+            f" {sum(counts)}, but FGD needs two or more; prepare longer recordings, train a network with smaller"
+            " --clip-frames, or leave out --features."
         )
     return sum(counts), counts.count(0)

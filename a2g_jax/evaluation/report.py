@@ -262,7 +262,9 @@ def _picture(result: dict[str, Any], path: Path) -> None:
         values = sorted(row["scores"][metric.key]["mean"] for row in rows if metric.key in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
             panel.set_xlim(0, 1.6 * values[-2])  # so that one row far beyond the others does not flatten them
-        panel.set_title(f"{metric.title}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9)
+        panel.set_title(
+            f"{_title(metric, result['about'])}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9
+        )
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
     for panel in list(axes.flat)[len(metrics) :]:

@@ -75,7 +75,7 @@ def _set_cells(
         vectors = np.concatenate([clip[sample] for clip in features])
         sets.append(scorer.set_scores(SetContext(vectors, reference, np.concatenate(labels))))
     cells = {}
-    vectors, width = (sum(len(clip[0]) for clip in features), reference.shape[1])
+    number, width = sum(len(clip[0]) for clip in features), reference.shape[1]
     for metric in scorer.metrics:
         values = [scores[metric.key] for scores in sets if metric.key in scores]
         if metric.scope == "set" and len(values) == len(sets):
@@ -85,7 +85,7 @@ def _set_cells(
                 "low": None,
                 "high": None,
                 "best": None if best is None else float(best(values)),
-                "vectors": vectors,
+                "vectors": number,
                 "features": width,
             }
     return cells

@@ -94,7 +94,7 @@ def _multimodality(clip: ClipContext) -> float:
     return _mean_of_pairs(clip.motions[0], clip.weighted)
 
 
-def _mean_of_pairs(context: MotionContext, motions: Float[np.ndarray, "N T P _"]) -> float:
+def _mean_of_pairs(context: MotionContext, motions: Float[Array | np.ndarray, "N T P _"]) -> float:
     """Mean distance of pairs of motions in the units of a context; NaN for a single motion."""
     if len(motions) < 2:
         return float("nan")

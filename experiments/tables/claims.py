@@ -92,7 +92,7 @@ def judge(table: str, claim: Claim) -> str:
         baseline = claim.baseline or claim.second
         other = claim.first if baseline == claim.second else claim.second
         if stands_still(table, baseline):
-            verdict = f"not decided, since the baseline ({baseline}) stands still"
+            verdict = f"not decided ({baseline} stands still)"
         elif verdict == "holds" and stands_still(table, other):
-            verdict = f"not decided, since {other} stands still"
+            verdict = f"not decided ({other} stands still)"
     return f"{verdict}: {mean:+.3g} +- {half:.2g} over {count} seeds"

@@ -146,7 +146,7 @@ def notes(table: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [_units(found).describe] if _units(found).describe else []
     scored = [record["scores"]["fgd"] for record in found if "fgd" in record["scores"]]
     old = [record for record in found if "units" not in record]
-    if old:
+    if old and any("position_l1" in record["scores"] for record in old):
         lines.append(
             "These records are in our own units: L1 distances are sums over coordinates and means over our joints."
         )

@@ -152,9 +152,7 @@ def test_few_vectors_are_marked_and_less_than_two_are_refused(corpus, network):
     text = markdown(evaluate({}, three, split="few", network=network, samples=1))
     assert "(n = 21, too few for 24 features)" in text
     assert "**21 vectors do not determine a covariance of 24 features" in text
-    with pytest.raises(
-        InputError, match="test split: its 1 clips of at most 360 frames give 1 feature vectors, of 300"
-    ):
+    with pytest.raises(InputError, match="test split: feature vectors are of 300 frames, and in clips of at most 360"):
         evaluate({}, corpus, network=with_clips_of(network, 300), samples=1)
     assert vectors_of([100, 49, 160], 50, "here") == (5, 1)
     about = {"feature_vectors": 5, "feature_width": 24, "short_clips": 1, "clips": 3}

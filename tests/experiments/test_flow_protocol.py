@@ -53,5 +53,5 @@ def test_every_table_has_the_rows_that_its_scores_are_read_against(corpus):
 
 
 def test_a_network_with_longer_clips_than_are_generated_is_refused(corpus):
-    with pytest.raises(InputError, match="clips of at most 20 frames give 0 feature vectors, of 21 frames each"):
+    with pytest.raises(InputError, match="feature vectors are of 21 frames, and in clips of at most 20 there are 0"):
         nulls(Ruler(corpus, network(21), 3), PROTOCOL)
