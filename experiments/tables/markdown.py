@@ -144,6 +144,9 @@ def _units(found: Sequence[Mapping[str, Any]]) -> Units:
 def notes(table: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
     """Sentences on units, feature vectors and networks of the records."""
     lines = [_units(found).describe] if _units(found).describe else []
+    models = {record["model"] for record in found if "model" in record}
+    if table.startswith("stylized_flow/") and models - {"stylized_flow"}:
+        lines.append("Flows are given the true first poses of each clip; the other models have none.")
     scored = [record["scores"]["fgd"] for record in found if "fgd" in record["scores"]]
     old = [record for record in found if "units" not in record]
     if old and any("position_l1" in record["scores"] for record in old):
