@@ -121,8 +121,11 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
 
 def _compare(options: argparse.Namespace) -> dict[str, Any]:
     """One table of several reports."""
-    if options.runs or options.corpus or options.features or options.audit or options.emotion_classifier:
-        raise InputError("--compare takes reports as they are; leave out runs, --corpus, --features and --audit.")
+    scored = (options.runs, options.corpus, options.features, options.audit, options.emotion_classifier)
+    if any(scored) or options.units != "ours":
+        raise InputError(
+            "--compare takes reports as they are; leave out runs, --corpus, --features, --units and --audit."
+        )
     if len(set(options.compare)) < len(options.compare):
         raise InputError("--compare: a report is named twice.")
     for folder in options.compare:

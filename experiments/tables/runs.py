@@ -151,7 +151,6 @@ def run_table(
     began = time.monotonic()
     ruler, measured = measure(table, where)
     corpus = ruler.corpus
-    check_networks(where, ruler)
     conditions = {**measured, "steps": where.steps}
     for seed in where.seeds:
         for name, variant in variants.items():
@@ -215,7 +214,11 @@ def baselines(table: str, where: Setting) -> None:
 
 
 def measure(table: str, where: Setting) -> tuple[Ruler, dict[str, Any]]:
-    """The ruler of a setting, in the units of the table's paper, and the fields that identify it in records."""
+    """The ruler of a setting, in the units of the table's paper, and the fields that identify it in records.
+
+    Raises:
+        InputError: the perceptual loss would use the network that scores.
+    """
     corpus = Corpus.open(where.corpus)
     network = None if where.features is None else load_feature_network(where.features, corpus)
     measured = {
@@ -225,7 +228,9 @@ def measure(table: str, where: Setting) -> tuple[Ruler, dict[str, Any]]:
         "units": units_of(table).key,
         "split": where.split,
     }
-    return Ruler(corpus, network, where.samples, units_of(table), where.split), measured
+    ruler = Ruler(corpus, network, where.samples, units_of(table), where.split)
+    check_networks(where, ruler)
+    return ruler, measured
 
 
 def units_of(table: str) -> Units:

@@ -298,6 +298,7 @@ def test_reports_are_put_side_by_side(corpus, tmp_path, capsys):
     assert names == [f"mine ({tmp_path / 'first'})", f"mine ({tmp_path / 'second'})", *MOTIONS]
     capsys.readouterr()
     assert main([*command[:4], "--out", str(out), "--corpus", str(corpus.path)]) == 2
+    assert main([*command, "--units", "audio2gestures"]) == 2
     assert main(["evaluate", "--compare", str(tmp_path), "--out", str(out)]) == 2
     assert "is no report" in capsys.readouterr().err
     other = {**table, "about": {**table["about"], "clips": 99}}
