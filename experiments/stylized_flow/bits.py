@@ -18,7 +18,7 @@ def continued_with_bits(protocol: Protocol) -> Score:
 
     def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
         found: dict[str, Any] = scored(name, run, ruler, seed)
-        if run.config.build().score is not None:
+        if run.config.build().density is not None:
             found["scores"]["bits_per_dim"] = _row(bits_per_dim(run, ruler.corpus, seed=seed))
         return found
 

@@ -9,7 +9,9 @@ from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.report import HALVES
+from a2g_jax.metrics.intervals import Interval
 from a2g_jax.metrics.units import UNITS
+from experiments.stylized_flow import bits
 from experiments.stylized_flow.protocol import Protocol, nulls, starts_of
 from experiments.tables.runs import Ruler
 
@@ -55,3 +57,16 @@ def test_every_table_has_the_rows_that_its_scores_are_read_against(corpus):
 def test_a_network_with_longer_clips_than_are_generated_is_refused(corpus):
     with pytest.raises(InputError, match="feature vectors are of 21 frames, and in clips of at most 20 there are 0"):
         nulls(Ruler(corpus, network(21), 3), PROTOCOL)
+
+
+def test_models_with_a_density_have_bits(monkeypatch, toy_run_config):
+    """Audio2Gestures has none; the capability is that of a real model, so that its name is checked too."""
+    monkeypatch.setattr(bits, "continued", lambda protocol: lambda *arguments: {"scores": {}})
+    found = Interval(-1.0, -1.1, -0.9, 3)
+    monkeypatch.setattr(bits, "bits_per_dim", lambda run, corpus, seed: SimpleNamespace(noisy=found))
+    model = toy_run_config().build()
+    score = bits.continued_with_bits(PROTOCOL)
+    for density, keys in ((None, []), (lambda params, batch: batch, ["bits_per_dim"])):
+        made = model._replace(density=density)
+        run = SimpleNamespace(config=SimpleNamespace(build=lambda made=made: made))
+        assert list(score("a", run, SimpleNamespace(corpus=None), 0)["scores"]) == keys
