@@ -231,7 +231,7 @@ def vectors_text(score: dict[str, Any]) -> str:
     """
     if not score.get("vectors"):
         return ""
-    few = f", too few for {score['features']} features" if score["vectors"] <= score["features"] else ""
+    few = ", too few" if score["vectors"] <= score["features"] else ""
     return f" (n = {score['vectors']}{few})"
 
 

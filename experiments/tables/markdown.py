@@ -153,6 +153,12 @@ def notes(table: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
         lines.append(
             "These records are in our own units: L1 distances are sums over coordinates and means over our joints."
         )
+    few = [score for score in scored if score.get("vectors", float("inf")) <= score.get("features", 0)]
+    if few:
+        lines.append(
+            f"FGD marked as of too few vectors for a covariance of {few[0]['features']} features is mostly the error of"
+            " that estimate."
+        )
     if scored and all("vectors" not in score for score in scored):
         clips = max((record.get("clips", 0) for record in found), default=0)
         # By the flow's protocols a clip gives one vector.

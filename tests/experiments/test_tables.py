@@ -110,9 +110,10 @@ def test_a_table_is_in_the_units_of_its_records_and_states_vectors(folder):
     for seed in range(3):
         add("ours", seed, 1.0, scores=speed | fgd, units="audio2gestures", split="test")
     new = render(TABLE, "Made up", ["ours", "old"], (), {"A2G": "speed 0.668"})
-    assert "| ours | 3 | 0.668 +- 0.000 | 2.00 +- 0.00 (n = 64, too few for 128 features) |" in new
+    assert "| ours | 3 | 0.668 +- 0.000 | 2.00 +- 0.00 (n = 64, too few) |" in new
     assert "speed L1, cm/frame ↓" in new
     assert "not in value, though in the same units:" in new
+    assert "too few vectors for a covariance of 128 features" in new
     assert "| old |" not in new  # records in other units do not stand in one table
 
 
