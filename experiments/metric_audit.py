@@ -32,6 +32,7 @@ from a2g_jax.io.files import atomic_path, make_folder, sha256_file, write_json
 from a2g_jax.metrics.beats import mel_onsets
 from a2g_jax.metrics.distribution import frechet_distance
 from a2g_jax.talker.recordings import cast, talk
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.training.run import WEIGHTS_FILE, load_run
 
 FPS = 30.0
@@ -44,7 +45,7 @@ def _rows(rotations: np.ndarray) -> Pose:
 
 def noise(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
     """White noise on every joint."""
-    return with_noise(pose, degrees, rng) if degrees else pose
+    return with_noise(PoseSpace(TALKER_SKELETON), pose, degrees, rng) if degrees else pose
 
 
 def wobble(pose: Pose, degrees: float, rng: np.random.Generator) -> Pose:
@@ -139,7 +140,8 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
 
     truth = result["late"]["scores"][0]
     result["mirrored"] = {"unit": "yes or no", "doses": [0, 1], "scores": [truth, score(mirrored)]}
-    return {"clips": len(rows), "seconds": options.seconds, "seed": options.seed, "corruptions": result}
+    about = {"clips": len(rows), "seconds": options.seconds, "seed": options.seed, "feature_vectors": len(reference)}
+    return {**about, "corruptions": result}
 
 
 def picture(result: dict[str, Any], path: Path) -> None:

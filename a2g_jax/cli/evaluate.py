@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 DESCRIPTION = (
     "Score runs on a held-out split, beside the scores of the ground truth, other right motions, noise, a neighbour's"
-    " motion and the mean pose."
+    " motion, a held pose and the mean pose."
 )
 
 
@@ -42,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--metric", action="append", metavar="MODULE:NAME", help="a metric of another package; may be repeated"
+    )
+    parser.add_argument(
+        "--units",
+        default="ours",
+        metavar="PAPER",
+        help="units of distances and speeds: ours, or those of the tables of audio2gestures or stylized-flow (default:"
+        " ours)",
     )
     parser.add_argument("--split", default="test", help="split of the corpus (default: test)")
     parser.add_argument("--samples", type=count, default=20, help="motions of each run for each clip (default: 20)")
@@ -81,9 +88,11 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
     from a2g_jax.evaluation.feature_network import load_feature_network
     from a2g_jax.metrics.catalogue import METRICS
     from a2g_jax.metrics.registry import find_metrics
+    from a2g_jax.metrics.units import find_units
     from a2g_jax.progress import progress_bar
     from a2g_jax.training.run import open_run
 
+    units = find_units(options.units)
     keep_compilations()
     runs: dict[str, Run] = {name: open_run(name) for name in options.runs}
     corpus = Corpus.open(options.corpus)
@@ -105,14 +114,18 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
             judge=judge,
             audit=options.audit,
             extra_metrics=find_metrics(options.metric or (), tuple(METRICS)),
+            units=units,
             report=report,
         )
 
 
 def _compare(options: argparse.Namespace) -> dict[str, Any]:
     """One table of several reports."""
-    if options.runs or options.corpus or options.features or options.audit or options.emotion_classifier:
-        raise InputError("--compare takes reports as they are; leave out runs, --corpus, --features and --audit.")
+    scored = (options.runs, options.corpus, options.features, options.audit, options.emotion_classifier)
+    if any(scored) or options.units != "ours":
+        raise InputError(
+            "--compare takes reports as they are; leave out runs, --corpus, --features, --units and --audit."
+        )
     if len(set(options.compare)) < len(options.compare):
         raise InputError("--compare: a report is named twice.")
     for folder in options.compare:

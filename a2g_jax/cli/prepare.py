@@ -52,7 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=count, help="processes; the corpus does not depend on it (default: one a core)"
     )
     parser.add_argument(
-        "--features", metavar="PAPER", help="rate, mel bands and poses of a paper (default: audio2gestures; see --list)"
+        "--features",
+        metavar="PAPER",
+        help="rate, mel bands and poses of a paper; see --list (default: those of audio2gestures, with a range of 60 dB"
+        " as the included weights have)",
     )
     parser.add_argument("--fps", type=frame_rate, help="frames per second (default: of the paper or the data set)")
     parser.add_argument(
@@ -197,9 +200,9 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
 
 def _features(options: argparse.Namespace) -> "Features":
     """The settings of a paper, changed by the flags."""
-    from a2g_jax.data.settings import find_features
+    from a2g_jax.data.settings import Features, find_features
 
-    features = find_features(options.features or "audio2gestures")
+    features = find_features(options.features) if options.features else Features()
     flags = {name: getattr(options, name) for name in ("fps", "pose", "joints", "waveform")}
     return dataclasses.replace(features, **{name: value for name, value in flags.items() if value})
 

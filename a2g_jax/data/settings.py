@@ -35,21 +35,25 @@ class Features:
         return asdict(self)
 
 
-_FLOW_RANGE = 80.0
+#: Dynamic range of the papers' spectrograms, librosa's default. Ours is smaller: the lowest bands are often noise.
+_PUBLISHED_RANGE = 80.0
 
 #: By paper and data.
 PRESETS: dict[str, Features] = {
     # Audio2Gestures, Sec. 5.3.1: 64 bands at the motion's 30 frames a second, body joints in 6D.
-    "audio2gestures": Features(),
+    "audio2gestures": Features(mel=MelConfig(range_db=_PUBLISHED_RANGE)),
     # Its experiments in 2D, after Speech2Gesture: 64 bands at 60 Hz, four spectra to a frame; keypoints at 15.
     "audio2gestures-2d": Features(
-        fps=15.0, mel=MelConfig(window=400, low_hz=125.0, high_hz=7500.0, stack=4), pose="keypoints", joints="all"
+        fps=15.0,
+        mel=MelConfig(window=400, low_hz=125.0, high_hz=7500.0, stack=4, range_db=_PUBLISHED_RANGE),
+        pose="keypoints",
+        joints="all",
     ),
     # The flow on Trinity, after StyleGestures: 27 bands at 20 frames a second, exponential maps.
-    "stylized-flow": Features(fps=20.0, mel=MelConfig(bands=27, range_db=_FLOW_RANGE), pose="exponential"),
+    "stylized-flow": Features(fps=20.0, mel=MelConfig(bands=27, range_db=_PUBLISHED_RANGE), pose="exponential"),
     # The flow on TED: 29 bands and directions of bones at 15 frames a second.
     "stylized-flow-ted": Features(
-        fps=15.0, mel=MelConfig(bands=29, range_db=_FLOW_RANGE), pose="directions", joints="all"
+        fps=15.0, mel=MelConfig(bands=29, range_db=_PUBLISHED_RANGE), pose="directions", joints="all"
     ),
     # EmotionGesture: 47 joints in 6D at 15 frames a second; its 128 x 124 windows are made from the waveform.
     "emotion-gesture": Features(fps=15.0, joints="upper-body", waveform=True),

@@ -14,17 +14,25 @@ from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.evaluation.audit import AudioCondition, listening_audit
-from a2g_jax.evaluation.baselines import mean_pose, nearest_neighbour, other_clip, right_motions, with_noise
+from a2g_jax.evaluation.baselines import (
+    first_pose,
+    mean_pose,
+    nearest_neighbour,
+    other_clip,
+    right_motions,
+    with_noise,
+)
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
-from a2g_jax.evaluation.feature_network import FeatureNetwork
-from a2g_jax.evaluation.report import BASELINES, describe_metrics
+from a2g_jax.evaluation.feature_network import FeatureNetwork, check_separate, vectors_of
+from a2g_jax.evaluation.report import HALVES, MOTIONS, describe_metrics
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
 from a2g_jax.evaluation.summary import summarise
 from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.distribution import split_floor
+from a2g_jax.metrics.distribution import FrechetDistance, split_floor
+from a2g_jax.metrics.units import OURS, Units
 from a2g_jax.training.run import Run
 
 #: Longest stretch that is scored, frames (Audio2Gestures, Sec. 5.3.1).
@@ -44,7 +52,8 @@ class Row:
     samples: int
     """Number of motions for each clip."""
     scores: dict[str, dict[str, Any]]
-    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips)."""
+    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips), and
+    for those of a feature network ``vectors`` and ``features``, their number and length."""
 
 
 def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
@@ -81,6 +90,7 @@ def evaluate(
     audit: bool = False,
     baselines: bool = True,
     extra_metrics: Sequence[Metric] = (),
+    units: Units = OURS,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Score runs and baselines; JSON-able.
@@ -95,12 +105,15 @@ def evaluate(
         audit: whether to audit each run (:mod:`a2g_jax.evaluation.audit`).
         baselines: whether to score the baselines too.
         extra_metrics: metrics of other packages (:func:`~a2g_jax.metrics.registry.find_metrics`).
+        units: of distances and speeds (:data:`~a2g_jax.metrics.units.UNITS`).
         report: called with the number of (candidate, clip) pairs done, and their total.
 
     Raises:
-        InputError: runs that do not fit the corpus, or a split without a stretch long enough.
+        InputError: runs that do not fit the corpus or that were trained with a loss on the feature network, or a split
+            without a stretch long enough.
     """
     check_runs(runs, corpus)
+    check_separate(runs, network)
     segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= _LEAST_FRAMES]
     stretches = len(segments)
     if stretches < _FEW:
@@ -109,13 +122,18 @@ def evaluate(
         segments = [piece for segment in segments for piece in _pieces(segment, least)]
     if not segments:
         raise InputError(f"{corpus.path}: its {split} split has no stretch of 100 frames; prepare longer recordings.")
-    scorer = Scorer(corpus.space, corpus.fps, network, judge, tuple(extra_metrics))
+    short = 0
+    if network is not None:
+        _, short = vectors_of(
+            [segment.frames for segment in segments], network.clip_frames, f"{corpus.path}, {split} split"
+        )
+    scorer = Scorer(corpus.space, corpus.fps, network, judge, tuple(extra_metrics), units)
     targets = [_target(corpus, scorer, segment) for segment in segments]
     reference = np.concatenate([scorer.features(target.pose) for target in targets])
     speakers = [corpus.recordings[segment.recording].speaker for segment in segments]
-    total, done, rows = (len(runs) + baselines * len(BASELINES)) * len(segments), 0, []
+    total, done, rows = (len(runs) + baselines * len(MOTIONS)) * len(segments), 0, []
     for name, draw in _candidates(runs, corpus, segments, samples, seed):
-        if not baselines and name in BASELINES and name not in runs:
+        if not baselines and name in MOTIONS and name not in runs:
             continue
         per_clip: list[list[dict[str, float]]] = []
         per_group: list[dict[str, float]] = []
@@ -133,6 +151,9 @@ def evaluate(
             features.append([scorer.features(pose) for pose in poses])
         if per_clip:
             rows.append(Row(name, count, summarise(scorer, per_clip, per_group, features, reference, speakers, seed)))
+    floor = None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed))
+    if baselines and floor is not None:
+        rows.append(Row(HALVES, 1, {"fgd": halves_cell(floor, reference.shape[1])}))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -149,12 +170,22 @@ def evaluate(
         "unit": scorer.space.unit,
         "feature_vectors": len(reference),
         "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
-        "floor": None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed)).value,
+        "floor": None if floor is None else floor.value,
+        "feature_width": None if network is None else network.features,
+        "short_clips": short,
+        "units": units.key,
+        "wrist_to_wrist": scorer.wrist_to_wrist,
     }
     if extra_metrics:
         about["extra_metrics"] = describe_metrics(extra_metrics)
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}
     return {"about": about, "rows": [asdict(row) for row in rows], "audits": audits}
+
+
+def halves_cell(floor: FrechetDistance, features: int) -> dict[str, Any]:
+    """The FGD of two halves of the truth, as a cell of a report."""
+    rest = {"low": None, "high": None, "best": None}
+    return {"mean": floor.value, **rest, "vectors": floor.samples, "features": features}
 
 
 def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], seed: int) -> dict[str, Any]:
@@ -235,9 +266,10 @@ def _candidates(
         lambda number: noise(number, 5.0),
         lambda number: [nearest_neighbour(corpus, segments[number])],
         lambda number: [other_clip(corpus, segments, number)],
+        lambda number: [first_pose(truth(number))],
         lambda number: [mean_pose(corpus, segments[number])],
     )
-    yield from zip(BASELINES, rows, strict=True)
+    yield from zip(MOTIONS, rows, strict=True)
 
 
 def _fingerprint(corpus: Corpus) -> str:

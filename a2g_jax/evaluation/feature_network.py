@@ -1,6 +1,7 @@
 """The trained network whose features are compared by learned metrics."""
 
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,8 +12,9 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
 from a2g_jax.training.perceptual import load_feature_run
-from a2g_jax.training.run import Run
+from a2g_jax.training.run import Run, RunConfig
 
 #: Residual block whose features FID compares: the fourth (Audio2Gestures, extended, Sec. 5.1).
 FID_BLOCK = 3
@@ -32,6 +34,12 @@ class FeatureNetwork:
         frames: int = self.run.config.model_config.clip_frames
         return frames
 
+    @property
+    def features(self) -> int:
+        """Length of a feature vector."""
+        width: int = self.run.config.model_config.encoder_channels[FID_BLOCK]
+        return width
+
     @cached_property
     def _blocks(self) -> Any:
         features = self.run.config.build().features
@@ -47,7 +55,7 @@ class FeatureNetwork:
         count = len(pose) // self.clip_frames
         clips = pose[: count * self.clip_frames].reshape(count, self.clip_frames, *pose.shape[1:])
         if count == 0:
-            return np.zeros((0, self.run.config.model_config.encoder_channels[FID_BLOCK]), np.float32)
+            return np.zeros((0, self.features), np.float32)
         return self.blocks(np.asarray(clips, np.float32))[FID_BLOCK].mean(axis=1)
 
 
@@ -58,3 +66,51 @@ def load_feature_network(folder: str | os.PathLike[str], corpus: Corpus) -> Feat
         InputError: not a run, one of another model, or one for other joints, poses or frame rates.
     """
     return FeatureNetwork(*load_feature_run(folder, corpus))
+
+
+def check_separate(runs: Mapping[str, Run], network: FeatureNetwork | None) -> None:
+    """Refuse to score runs with the network that a loss of theirs used.
+
+    A run that was trained to match a network's features scores well by these features, whatever it looks like.
+
+    Args:
+        runs: runs by name.
+        network: for FGD and LPIPS; None for neither.
+
+    Raises:
+        InputError: a run's perceptual loss used the network.
+    """
+    for name, run in runs.items():
+        if network is not None and trained_against(run.config, network):
+            raise InputError(
+                f"{name}: was trained with a loss on the feature network {network.fingerprint[:16]}, which therefore"
+                " favours it in FGD and LPIPS; give --features a network trained with another seed (a2g train"
+                " motion_autoencoder --seed 1), or leave it out."
+            )
+
+
+def trained_against(config: RunConfig, network: FeatureNetwork) -> bool:
+    """Whether a loss of a run uses the network: the same weights, by their hash."""
+    used = config.perceptual if config.build().needs_perceptual else None
+    return used is not None and used.fingerprint == network.fingerprint
+
+
+def vectors_of(frames: Sequence[int], clip_frames: int, where: str) -> tuple[int, int]:
+    """Number of feature vectors in clips of these lengths, and of clips too short for one.
+
+    Args:
+        frames: length of each clip.
+        clip_frames: frames from which the network takes one vector.
+        where: the corpus and split, for the error.
+
+    Raises:
+        InputError: fewer than two vectors, which have no covariance.
+    """
+    counts = [count // clip_frames for count in frames]
+    if sum(counts) < 2:
+        raise InputError(
+            f"{where}: feature vectors are of {clip_frames} frames, and in clips of at most {max(frames)} there are"
+            f" {sum(counts)}, but FGD needs two or more; prepare longer recordings, train a network with smaller"
+            " --clip-frames, or leave out --features."
+        )
+    return sum(counts), counts.count(0)

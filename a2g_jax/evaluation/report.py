@@ -6,20 +6,26 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
+from a2g_jax.evaluation.report_notes import condition, notes, preface
 from a2g_jax.evaluation.scores import METRICS, Metric
 from a2g_jax.io.files import atomic_path, make_folder, read_json
+from a2g_jax.metrics.units import find_units
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
-#: Baselines, in the order of the table.
-BASELINES = (
+#: Motions of baselines, in the order of the table.
+MOTIONS = (
     "truth",
     "another right motion",
     "truth, 1 degree of noise",
     "truth, 5 degrees of noise",
     "nearest neighbour in audio",
     "another clip's motion",
+    "first pose held",
     "mean pose",
 )
+#: The floor of FGD: two random halves of the truth's vectors.
+HALVES = "one half of the truth against the other"
+BASELINES = (*MOTIONS, HALVES)
 _LATEX_ARROWS = {"lower": r"$\downarrow$", "higher": r"$\uparrow$", "truth": r"$\approx$"}
 
 
@@ -52,20 +58,21 @@ def markdown(result: dict[str, Any]) -> str:
         ("Against the recorded motion", [metric for metric in metrics if metric.against_target]),
         ("Distribution, variety, rhythm and smoothness", [metric for metric in metrics if not metric.against_target]),
     ):
-        head = [f"{metric.title}{_unit(metric, about)} {_ARROWS[metric.better]}" for metric in part]
+        head = [f"{_title(metric, about)}{_unit(metric, about)} {_ARROWS[metric.better]}" for metric in part]
         lines += [f"**{title}**", "", "| | samples | " + " | ".join(head) + " |", "|" + " --- |" * (len(part) + 2)]
         for row in result["rows"]:
             cells = [_cell(row["scores"].get(metric.key), metric) for metric in part]
             lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
         lines.append("")
     audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
-    return "\n".join([*_preface(about), "", *lines, *_notes(about), "", *audits])
+    return "\n".join([*preface(about), "", *lines, *notes(about), "", *audits])
 
 
 def latex(result: dict[str, Any]) -> str:
     """A table for a paper (needs booktabs): means, with the best of the samples in brackets."""
     metrics = _metrics(result)
-    head = " & ".join(["", *(f"{metric.title} {_LATEX_ARROWS[metric.better]}" for metric in metrics)])
+    titles = [f"{_title(metric, result['about'])} {_LATEX_ARROWS[metric.better]}" for metric in metrics]
+    head = " & ".join(["", *titles])
     lines = [r"\begin{tabular}{l" + "r" * len(metrics) + "}", r"\toprule", head + r" \\", r"\midrule"]
     for row in result["rows"]:
         cells = []
@@ -75,7 +82,8 @@ def latex(result: dict[str, Any]) -> str:
                 cells.append("--")
                 continue
             best = f" ({score['best']:.{digits}f})" if row["samples"] > 1 and score["best"] is not None else ""
-            cells.append(f"{score['mean']:.{digits}f}{best}")
+            vectors = f", $n = {score['vectors']}$" if score.get("vectors") else ""
+            cells.append(f"{score['mean']:.{digits}f}{best}{vectors}")
         name = row["name"].replace("_", r"\_").replace("&", r"\&").replace("%", r"\%")
         lines.append(" & ".join([name, *cells]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])
@@ -88,12 +96,15 @@ def check_comparable(results: dict[str, dict[str, Any]]) -> None:
         results: contents of ``report.json`` files by name.
 
     Raises:
-        InputError: different skeletons, corpora, splits, numbers of samples, feature networks or classifiers.
+        InputError: different skeletons, corpora, splits, numbers of samples, units, feature networks or classifiers.
     """
     (first, reference), *others = results.items()
     for name, result in others:
-        for key in ("skeleton", "corpus", "split", "samples", "clips", "feature_network", "emotion_classifier"):
-            here, there = reference["about"].get(key), result["about"].get(key)
+        for key in (
+            *("skeleton", "corpus", "split", "samples", "clips", "units", "wrist_to_wrist"),
+            *("feature_network", "emotion_classifier"),
+        ):
+            here, there = (condition(each["about"], key) for each in (reference, result))
             if here != there:
                 raise InputError(
                     f"{first} and {name}: cannot be compared: {key.replace('_', ' ')} is {here} in one and {there} in"
@@ -165,11 +176,11 @@ def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
         "| audio | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
         "| --- | --- | --- | --- |",
     ]
-    for condition, row in audit["conditions"].items():
+    for name, row in audit["conditions"].items():
         share, agreement = f"{row['change_of_sampling']:.2f}", f"{row['agreement']:.3f}"
         if row.get("agreement_interval"):
             agreement += f" [{row['agreement_interval'][0]:.3f}, {row['agreement_interval'][1]:.3f}]"
-        lines.append(f"| {condition} | {row['change_cm']:.1f} | {share} | {agreement} |")
+        lines.append(f"| {name} | {row['change_cm']:.1f} | {share} | {agreement} |")
     return [*lines, ""]
 
 
@@ -180,10 +191,17 @@ def describe_metrics(metrics: Sequence[Metric]) -> dict[str, dict[str, Any]]:
 
 
 def _metrics(result: dict[str, Any]) -> list[Metric]:
-    """The metrics that any row has."""
+    """The metrics that any row has, in the report's units."""
+    units = find_units(condition(result["about"], "units"))
     extra = {key: Metric(key=key, **values) for key, values in result["about"].get("extra_metrics", {}).items()}
     scored = {name for row in result["rows"] for name in row["scores"]}
-    return [metric for metric in (METRICS | extra).values() if metric.key in scored]
+    return [units.shown(metric) for metric in (METRICS | extra).values() if metric.key in scored]
+
+
+def _title(metric: Metric, about: dict[str, Any]) -> str:
+    """Title of a column; reports of 0.1 scaled L1* by the length of the bones from wrist to wrist."""
+    old = metric.key == "position_l1_star" and "wrist_to_wrist" not in about
+    return f"{metric.title} (by the bones' length, as in 0.1)" if old else metric.title
 
 
 def _unit(metric: Metric, about: dict[str, Any]) -> str:
@@ -203,46 +221,18 @@ def _cell(score: dict[str, Any] | None, metric: Metric) -> str:
         text += f" [{score['low']:.{digits}f}, {score['high']:.{digits}f}]"
     if score["best"] is not None and score["best"] != score["mean"]:
         text += f" best {score['best']:.{digits}f}"
-    return text
+    return text + vectors_text(score)
 
 
-def _preface(about: dict[str, Any]) -> list[str]:
-    return [
-        f"# Evaluation on the {about['split']} split",
-        "",
-        f"{about['clips']} clips, {about['seconds']:.0f} s; {about['samples']} samples of each model for each clip,"
-        f" seed {about['seed']}; corpus {about['corpus'][:16]} ({about['recipe'].get('reader')}); package"
-        f" {about['package']}.",
-    ]
+def vectors_text(score: dict[str, Any]) -> str:
+    """The number of feature vectors behind a score, and whether they are fewer than their features; empty for others.
 
-
-def _notes(about: dict[str, Any]) -> list[str]:
-    few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
-    if about["clips"] > about["stretches"]:
-        few = (
-            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals"
-            " understate the uncertainty, and do not extend to other recordings or speakers."
-        )
-    notes = [
-        "Brackets hold 95 % intervals over clips (bootstrap)." + few,
-        "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",
-        "↓ lower is better, ↑ higher is better, ≈ nearer to the truth is better. Beat alignment has no zero: compare"
-        " with the other rows. Diversity and multimodality are means over pairs; the published sums are 0.95 of them at"
-        " 20 samples.",
-        "No score here measures what people prefer.",
-    ]
-    if about["feature_network"] is not None:
-        floor = "" if about["floor"] is None else f" two halves of the truth are {about['floor']:.2f} apart;"
-        notes.append(
-            f"FGD and LPIPS use the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
-            f" vectors in a set;{floor} FGD falls with n."
-            + (
-                ""
-                if about.get("own_features", True)
-                else " The network was trained on another corpus: movement that is rare there has too much weight here."
-            )
-        )
-    return [f"- {note}" for note in notes]
+    Scores of 0.1 do not state it.
+    """
+    if not score.get("vectors"):
+        return ""
+    few = ", too few" if score["vectors"] <= score["features"] else ""
+    return f" (n = {score['vectors']}{few})"
 
 
 def _picture(result: dict[str, Any], path: Path) -> None:
@@ -272,7 +262,9 @@ def _picture(result: dict[str, Any], path: Path) -> None:
         values = sorted(row["scores"][metric.key]["mean"] for row in rows if metric.key in row["scores"])
         if len(values) > 2 and values[-1] > 4 * values[-2] > 0:
             panel.set_xlim(0, 1.6 * values[-2])  # so that one row far beyond the others does not flatten them
-        panel.set_title(f"{metric.title}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9)
+        panel.set_title(
+            f"{_title(metric, result['about'])}{_unit(metric, result['about'])} {_ARROWS[metric.better]}", fontsize=9
+        )
         panel.tick_params(labelsize=8)
         panel.spines[["top", "right"]].set_visible(False)
     for panel in list(axes.flat)[len(metrics) :]:

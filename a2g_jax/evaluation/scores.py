@@ -18,6 +18,7 @@ from a2g_jax.metrics import pointwise
 from a2g_jax.metrics.catalogue import METRICS as METRICS
 from a2g_jax.metrics.context import ClipContext, MotionContext, PairContext, SetContext
 from a2g_jax.metrics.registry import Metric as Metric
+from a2g_jax.metrics.units import OURS, Units
 
 #: Metrics that are a number for each motion; the others are one for a clip, or one for a split.
 PER_SAMPLE = tuple(name for name, metric in METRICS.items() if metric.per_sample)
@@ -46,6 +47,7 @@ class Scorer:
     judge: EmotionJudge | None = None
     extra_metrics: tuple[Metric, ...] = ()
     """Metrics of other packages, after :data:`METRICS`."""
+    units: Units = OURS
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -64,11 +66,13 @@ class Scorer:
             onsets=target.onsets,
             rotations_of=self.space.read,
             wrists_of=self.space.wrists,
-            wrist_to_wrist=self._wrist_to_wrist,
+            wrist_to_wrist=self.wrist_to_wrist,
             emotion=target.emotion,
             relevance=target.relevance,
             network=self.network,
             classifier=self.judge,
+            units=self.units,
+            weights=self._weights,
         )
         compiled = tuple(metric for metric in self.metrics if metric.scope == "pair")
         return replace(context, pair_scores=_pair_scores(compiled, context.pair))
@@ -102,9 +106,14 @@ class Scorer:
         return np.zeros((0, 1), np.float32) if self.network is None else self.network.clip_features(pose)
 
     @cached_property
-    def _wrist_to_wrist(self) -> float | None:
+    def wrist_to_wrist(self) -> float | None:
+        """Distance of the body's wrists in T-pose, metres; None where wrists are not found."""
         body = self.space.body
         return pointwise.wrist_to_wrist(body) if isinstance(body, Skeleton) else None
+
+    @cached_property
+    def _weights(self) -> Float[np.ndarray, " P"] | None:
+        return self.units.weights(self.space.body)
 
 
 def _value(metric: Metric, context: Any) -> Any:

@@ -64,7 +64,10 @@ def _sample_cell(
 def _set_cells(
     scorer: Scorer, features: list[list[np.ndarray]], reference: np.ndarray, speakers: list[str]
 ) -> dict[str, dict[str, Any]]:
-    """One set of vectors for each sample number, over all clips, so that there are as many as of the truth."""
+    """One set of vectors for each sample number, over all clips, so that there are as many as of the truth.
+
+    Each cell states the number of vectors in a set and of their features.
+    """
     numbers = {name: number for number, name in enumerate(sorted(set(speakers)))}
     sets = []
     for sample in range(len(features[0])):
@@ -72,6 +75,7 @@ def _set_cells(
         vectors = np.concatenate([clip[sample] for clip in features])
         sets.append(scorer.set_scores(SetContext(vectors, reference, np.concatenate(labels))))
     cells = {}
+    number, width = sum(len(clip[0]) for clip in features), reference.shape[1]
     for metric in scorer.metrics:
         values = [scores[metric.key] for scores in sets if metric.key in scores]
         if metric.scope == "set" and len(values) == len(sets):
@@ -81,5 +85,7 @@ def _set_cells(
                 "low": None,
                 "high": None,
                 "best": None if best is None else float(best(values)),
+                "vectors": number,
+                "features": width,
             }
     return cells

@@ -20,13 +20,14 @@ def _flat(positions: Float[Array | np.ndarray, "T P D"]) -> Float[Array | np.nda
 
 
 def _position_l1(pair: PairContext) -> Any:
-    return pair.scale * pointwise.position_l1(pair.positions, pair.target_positions)
+    return pair.distance_scale * pointwise.position_l1(pair.positions, pair.target_positions, pair.weights)
 
 
 def _position_l1_star(context: MotionContext) -> Any:
     if context.wrist_to_wrist is None:
         return None
-    return context.pair_scores["position_l1"] * pointwise.REFERENCE_WRIST_TO_WRIST / context.wrist_to_wrist
+    scaled = context.pair_scores["position_l1"] / context.size
+    return scaled * pointwise.REFERENCE_WRIST_TO_WRIST / context.wrist_to_wrist
 
 
 def _position_l2(pair: PairContext) -> Any:
@@ -34,15 +35,15 @@ def _position_l2(pair: PairContext) -> Any:
 
 
 def _speed_l1(pair: PairContext) -> Any:
-    return pair.scale * pair.fps * pointwise.speed_l1(pair.positions, pair.target_positions)
+    return pair.speed_scale * pointwise.speed_l1(pair.positions, pair.target_positions, 1.0, pair.weights)
 
 
 def _acceleration_l1(pair: PairContext) -> Any:
-    return pair.fps**2 * pointwise.acceleration_l1(pair.positions, pair.target_positions)
+    return pair.acceleration_scale * pointwise.acceleration_l1(pair.positions, pair.target_positions, 1.0, pair.weights)
 
 
 def _pck(pair: PairContext) -> Any:
-    return pointwise.pck(pair.positions, pair.target_positions, pair.threshold)
+    return pointwise.pck(pair.positions, pair.target_positions, pair.threshold, pair.weights)
 
 
 _rotation_error = jax.jit(pointwise.joint_rotation_error)
@@ -86,14 +87,19 @@ def _fgd(split: SetContext) -> float | None:
 
 
 def _diversity(context: MotionContext) -> float:
-    clips = diversity.clips_of(context.positions)
-    return context.scale * (diversity.mean_pair_distance(clips) if len(clips) > 1 else float("nan"))
+    return _mean_of_pairs(context, diversity.clips_of(context.weighted))
 
 
 def _multimodality(clip: ClipContext) -> float:
-    if len(clip.motions) < 2:
+    return _mean_of_pairs(clip.motions[0], clip.weighted)
+
+
+def _mean_of_pairs(context: MotionContext, motions: Float[Array | np.ndarray, "N T P _"]) -> float:
+    """Mean distance of pairs of motions in the units of a context; NaN for a single motion."""
+    if len(motions) < 2:
         return float("nan")
-    return clip.scale * diversity.mean_pair_distance(clip.positions)
+    factor = diversity.paper_factor(len(motions)) if context.units.published_pairs else 1.0
+    return context.distance_scale * factor * diversity.mean_pair_distance(motions)
 
 
 def _beat_alignment(context: MotionContext) -> float:
@@ -140,6 +146,10 @@ def _speed_hellinger(context: MotionContext) -> float | None:
     return distribution.speed_hellinger(ours, theirs)
 
 
+def _wrist_speed(context: MotionContext) -> float:
+    return float(np.mean(np.asarray(physical.speeds(context.wrists, context.fps))))
+
+
 def _jerk(context: MotionContext) -> float:
     return float(np.percentile(np.asarray(physical.jerk(context.wrists, context.fps)), 90))
 
@@ -156,8 +166,8 @@ METRICS: dict[str, Metric] = {
         ),
         Metric(
             "position L1*", "cm", "lower", f"{_A2G}, Eq. 23", 2, key="position_l1_star", against_target=True,
-            measures="Position L1 as on a skeleton of 120.64 cm from wrist to wrist, to compare skeletons of different"
-            " size.",
+            measures="Position L1 as on a skeleton whose wrists are 120.64 cm apart in T-pose, to compare skeletons of"
+            " different size. Ours are 136.4 cm apart.",
             blind_spots="Those of position L1; not defined where wrists are not found.", function=_position_l1_star,
         ),
         Metric(
@@ -278,6 +288,11 @@ METRICS: dict[str, Metric] = {
             measures="90th percentile of the third derivative of wrist positions.",
             blind_spots="Smooth motion that has nothing to do with the speech is as good as the truth.",
             function=_jerk,
+        ),
+        Metric(
+            "wrist speed", "m/s", "truth", "GENEA", 2, key="wrist_speed",
+            measures="Mean speed of the wrists; of all points where wrists are not found.",
+            blind_spots="Jitter raises it; the audio does not matter.", function=_wrist_speed,
         ),
     )
 }  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from a2g_jax.metrics import beats, pointwise
+from a2g_jax.metrics.units import OURS, Units
 
 Pose = Float[np.ndarray, "T R D"]
 Points = Float[np.ndarray, "T P _"]
@@ -47,6 +48,14 @@ class PairContext(NamedTuple):
     fps: float | Float[Array, ""]
     scale: float | Float[Array, ""]
     """Factor from the unit of the positions to that of a report: 100 for metres, else 1."""
+    distance_scale: float | Float[Array, ""]
+    """Factor from an L1 distance of positions to a report's units (:class:`~a2g_jax.metrics.units.Units`)."""
+    speed_scale: float | Float[Array, ""]
+    """The same from an L1 distance of first differences."""
+    acceleration_scale: float | Float[Array, ""]
+    """The same from an L1 distance of second differences."""
+    weights: Float[Array | np.ndarray, " P"] | None
+    """Weights of the points in a mean; None where all count alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +78,7 @@ class MotionContext:
     wrists_of: Callable[[Points], Points] = lambda positions: positions
     """The wrists among the points; all points where wrists are not found."""
     wrist_to_wrist: float | None = None
-    """Length of the bones from wrist to wrist, metres; None where wrists are not found."""
+    """Distance of the wrists in T-pose, metres; None where wrists are not found."""
     emotion: str = ""
     relevance: Float[np.ndarray, " T"] | None = None
     """Semantic relevance of each frame; None without labels."""
@@ -77,21 +86,56 @@ class MotionContext:
     classifier: EmotionClassifier | None = None
     pair_scores: Mapping[str, Any] = field(default_factory=dict)
     """Values of the metrics over :class:`PairContext`, by key."""
+    units: Units = OURS
+    weights: Float[np.ndarray, " P"] | None = None
+    """Weights of the points in a mean, with a sum of 1; None where all count alike."""
 
     @property
     def scale(self) -> float:
         """Factor from the unit of the positions to that of a report."""
         return 100.0 if self.metres else 1.0
 
+    @property
+    def size(self) -> float:
+        """Factor from the lengths of the body to those of the skeleton of the units (Eq. 23); 1 where they have none,
+        or where wrists are not found."""
+        if self.units.reference is None or self.wrist_to_wrist is None:
+            return 1.0
+        return self.units.reference / self.wrist_to_wrist
+
+    @property
+    def distance_scale(self) -> float:
+        """Factor from an L1 distance of positions to the units."""
+        return self.scale * self.size * self.units.axis_share(self.positions.shape[-1])
+
+    @property
+    def weighted(self) -> Points:
+        """Positions whose plain mean over points of L1 distances is the weighted one."""
+        if self.weights is None:
+            return self.positions
+        return self.positions * (len(self.weights) * self.weights)[:, None]
+
     @cached_property
     def threshold(self) -> float:
         """Distance within which a point counts as correct, in the unit of the positions."""
-        return pointwise.correct_within(self.target_positions, self.metres)
+        return pointwise.correct_within(self.target_positions, self.metres) / self.size
 
     @property
     def pair(self) -> PairContext:
         """The part that compiled metrics look at."""
-        return PairContext(self.positions, self.target_positions, self.threshold, self.fps, self.scale)
+        distance, per_frame = self.distance_scale, self.units.per_frame
+        return PairContext(
+            self.positions,
+            self.target_positions,
+            self.threshold,
+            self.fps,
+            self.scale,
+            distance,
+            distance if per_frame else distance * self.fps,
+            # In metres per second squared: centimetres give large numbers.
+            distance if per_frame else distance / self.scale * self.fps**2,
+            self.weights,
+        )
 
     @cached_property
     def rotations(self) -> Rotations | None:
@@ -134,6 +178,11 @@ class ClipContext:
     def positions(self) -> Float[np.ndarray, "N T P _"]:
         """Points of all motions."""
         return np.stack([motion.positions for motion in self.motions])
+
+    @property
+    def weighted(self) -> Float[np.ndarray, "N T P _"]:
+        """:attr:`MotionContext.weighted` of all motions."""
+        return np.stack([motion.weighted for motion in self.motions])
 
 
 class SetContext(NamedTuple):

@@ -12,8 +12,8 @@ _HEAD = """\
 # Reading the scores
 
 `a2g evaluate` prints these beside the scores of the truth, other right motions, noise, a neighbour's motion, another
-clip's motion and the mean pose. Formulas and shapes are in the docstrings of `a2g_jax.metrics`. The root is at the
-origin, so walking does not count. ≈ means that a value near that of the truth is better.
+clip's motion, a held pose and the mean pose. Formulas and shapes are in the docstrings of `a2g_jax.metrics`. The root
+is at the origin, so walking does not count. ≈ means that a value near that of the truth is better.
 """
 
 _GENERAL = """\
@@ -24,9 +24,9 @@ known, otherwise as directions. Onsets in a report come from the corpus's log-me
 classifier trained on motion: `a2g train emotion_classifier --input motion --corpus CORPUS --out RUN`.
 
 `a2g evaluate --compare REPORT REPORT ... --out DIR` puts reports side by side, and refuses those of other corpora,
-splits, skeletons, numbers of samples, feature networks or classifiers. `--features demo` is the feature network that
-comes with the package: made by `a2g prepare talker --minutes 90 --seed 6` and `a2g train motion_autoencoder --steps
-2000`.
+splits, skeletons, numbers of samples, units, feature networks or classifiers. `--features demo` is the feature network
+that comes with the package: made by `a2g prepare talker --minutes 90 --seed 6` and `a2g train motion_autoencoder
+--steps 2000`.
 
 - **FGD falls with the number of vectors**, for equal distributions. Two samples of the same Gaussian, mean of three
   pairs, NumPy seed 0:
@@ -36,12 +36,17 @@ comes with the package: made by `a2g prepare talker --minutes 90 --seed 6` and `
   | 32 dimensions | 12.03 | 6.13 | 2.78 | 1.33 | 0.65 | 0.15 |
   | 128 dimensions | 131.09 | 83.15 | 42.62 | 20.36 | 8.49 | 2.13 |
 
-  A report states the number of vectors and the distance of two halves of the truth from each other. Learned scores are
-  comparable only with the same feature network: its hash is in the report.
+  A report states the number of vectors beside each figure, marks figures of too few, refuses those of fewer than two,
+  and has the distance of two halves of the truth as a row. Learned scores are comparable only with the same feature
+  network: its hash is in the report. Runs whose perceptual loss used that network are refused.
 - **Beat alignment has no zero**: `a2g_jax.metrics.beats.with_null` compares a score with that of the same motion moved
   in time.
 - **The best of 20 beats the mean of 20**, of any model and of the truth's own other motions.
 - Diversity and multimodality are means over pairs; the published sums are 0.95 of them at 20 motions.
+- `--units audio2gestures` and `--units stylized-flow` give the units of these papers' tables. Units of the first: L1
+  distances are means over coordinates and over the 55 joints of SMPL-X (fingers count as their wrist, jaw and eyes as
+  the head), on a skeleton of 120.64 cm from wrist to wrist; speeds and accelerations are centimetres per frame. STFT
+  and SSIM stay as they are. Units of the second: L1 distances are means over coordinates.
 - NaN in a motion gives NaN; nothing is left out silently.
 
 [Response of each metric](../experiments/results/metric_audit/metric_audit.png) to motion that is noisy, late, slow,

@@ -12,7 +12,7 @@ the content of the two codes when they are exchanged between motions.
 import json
 from typing import Any
 
-from experiments.tables.records import records, results
+from experiments.tables.records import current, results
 
 BASELINE, FULL = "baseline", "+ diversity loss"
 #: Rows that show which losses keep the shared code informative.
@@ -28,7 +28,7 @@ def of(variant: str, steps: int) -> list[dict[str, Any]]:
     """Records of a row of Table 2."""
     return [
         record
-        for record in records("audio2gestures/table2")
+        for record in current("audio2gestures/table2")
         if record["variant"] == variant and record["steps"] == steps
     ]
 
@@ -53,12 +53,12 @@ def _interval(value: dict[str, Any]) -> str:
 def page() -> str:
     """Return the page as Markdown."""
     steps = max(
-        (record["steps"] for record in records("audio2gestures/table2") if record["variant"] == FULL), default=0
+        (record["steps"] for record in current("audio2gestures/table2") if record["variant"] == FULL), default=0
     )
     truth = next(
         (
             record["scores"]["multimodality"]["mean"]
-            for record in records("audio2gestures/table2")
+            for record in current("audio2gestures/table2")
             if record["variant"] == "another right motion"
         ),
         None,
@@ -78,7 +78,7 @@ def page() -> str:
         for record in of(name, steps):
             if record.get("audit"):
                 lines.append(f"| {name} | {record['seed']} | {rhythm_cells(record)} |")
-    for record in records("audio2gestures/long"):
+    for record in current("audio2gestures/long"):
         if record.get("audit"):
             title = f"{record['variant']}, {record['steps']} steps"
             lines.append(f"| {title} | {record['seed']} | {rhythm_cells(record)} |")

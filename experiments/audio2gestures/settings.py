@@ -1,4 +1,8 @@
-"""Common settings of the tables of Audio2Gestures."""
+"""Common settings of the tables of Audio2Gestures.
+
+``python -m experiments.audio2gestures.select`` compares settings on seeds and recordings that the tables do not report.
+Those below are older than it: they were chosen on seed 0, which the tables count.
+"""
 
 #: Changes of the tiny preset for every row of Audio2Gestures, chosen on seed 0: clips of 64 frames, as in the authors'
 #: published command; a wider specific code, a larger diversity loss, and in generation one draw of the statistics for

@@ -1,6 +1,6 @@
 """Table 4: structured and perceptual training losses; rows of the truth with noise are among the baselines.
 
-    python -m experiments.audio2gestures.table4 --corpus CORPUS --features RUN [--budget MINUTES]
+    python -m experiments.audio2gestures.table4 --corpus CORPUS --features RUN --perceptual RUN [--budget MINUTES]
 
 The paper does not give the losses' weights. Ours make each term about as large as the position loss early in training.
 """

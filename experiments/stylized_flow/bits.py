@@ -1,5 +1,6 @@
 """Bits per dimension in addition to the scores of continued clips, and the row of the conditional Gaussian."""
 
+from dataclasses import replace
 from typing import Any
 
 from a2g_jax.evaluation.likelihood import Likelihood, bits_per_dim, gaussian_bits_per_dim
@@ -17,7 +18,7 @@ def continued_with_bits(protocol: Protocol) -> Score:
 
     def score(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
         found: dict[str, Any] = scored(name, run, ruler, seed)
-        if run.config.build().score is not None:
+        if run.config.build().density is not None:
             found["scores"]["bits_per_dim"] = _row(bits_per_dim(run, ruler.corpus, seed=seed))
         return found
 
@@ -30,7 +31,9 @@ def with_gaussian(table: str, where: Setting, variant: Variant) -> None:
     Args:
         variant: the flow, whose clips, history, lookahead and noise the Gaussian has.
     """
-    ruler, measured = measure(where)
+    ruler, measured = measure(table, where)
+    # The Gaussian has the clips and noise of the flow, but not its losses.
+    variant = replace(variant, changes={**variant.changes, "perceptual_weight": 0.0})
     for seed in where.seeds:
         identity = {"variant": GAUSSIAN, "seed": seed, **measured, "steps": 0}
         if any(identity.items() <= record.items() for record in records(table)):

@@ -1,5 +1,7 @@
 """The flow paper's two protocols: clips continued from their first poses (Sec. 4.1), and their scores (Sec. 4.2).
 
+L1 distances are means over coordinates, as in the paper's tables.
+
 TED: 42 frames at 15 fps, 12 given and 30 generated. Trinity: 120 frames at 20 fps, 5 given, 95 generated, and 20 of
 lookahead. Only generated frames are scored. Every row of a table is scored on the same clips and frames, whatever
 history it needs itself.
@@ -13,10 +15,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.evaluation.baselines import right_motions
+from a2g_jax.evaluation.evaluate import halves_cell
+from a2g_jax.evaluation.feature_network import vectors_of
+from a2g_jax.evaluation.report import HALVES
 from a2g_jax.generation.continuation import continue_clips
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.metrics import beats, diversity, physical
-from a2g_jax.metrics.distribution import frechet_distance
+from a2g_jax.metrics.distribution import frechet_distance, split_floor
 from a2g_jax.metrics.intervals import bootstrap_mean
 from a2g_jax.metrics.pointwise import correct_within
 from a2g_jax.training.run import Run
@@ -33,8 +39,8 @@ class Protocol:
     """First generated frame."""
     last: int
     """One after the last generated frame."""
-    most: int = 64
-    """Maximum number of scored clips, evenly spread over the test split."""
+    most: int = 256
+    """Maximum number of scored clips, evenly spread over the test split: FGD needs more vectors than features."""
 
 
 TED = Protocol(42, 12, 42)
@@ -85,34 +91,51 @@ def scores_of(
     corpus, space = ruler.corpus, ruler.corpus.space
     audio, pose = clips_of(corpus, protocol, starts)
     inner = slice(protocol.first, protocol.last)
+    axes = ruler.units.axis_share(space.positions(pose[0][:1]).shape[-1])
     truth = [space.positions(one[inner]) for one in pose]
     onsets = [beats.mel_onsets(one[inner], corpus.fps) for one in audio]
     places = [[space.positions(sample) for sample in clip] for clip in made]
-    per_clip: dict[str, list[list[float]]] = {name: [] for name in ("position_l1", "pck", "beat_alignment", "jerk")}
+    names = ("position_l1", "pck", "beat_alignment", "jerk", "wrist_speed")
+    per_clip: dict[str, list[list[float]]] = {name: [] for name in names}
     for clip, target, speech in zip(places, truth, onsets, strict=True):
         near = correct_within(target, space.metres)
         distance = [np.abs(sample - target) for sample in clip]
-        per_clip["position_l1"].append([space.scale * float(d.sum(-1).mean()) for d in distance])
+        per_clip["position_l1"].append([axes * space.scale * float(d.sum(-1).mean()) for d in distance])
         per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])
         moves = [beats.motion_beats(sample, corpus.fps, smoothing=2.0 / corpus.fps) for sample in clip]
         sigma = beats.FLOW_SIGMA_FRAMES / corpus.fps
         per_clip["beat_alignment"].append([beats.beat_alignment(m, speech, sigma) for m in moves if len(speech)])
         per_clip["jerk"].append([_jerk(space, sample, corpus.fps) for sample in clip])
+        speeds = [physical.speeds(space.wrists(sample), corpus.fps) for sample in clip]
+        per_clip["wrist_speed"].append([float(np.mean(np.asarray(speed))) for speed in speeds])
     rng = np.random.default_rng(seed)
     summary = {name: _summary(name, values, rng) for name, values in per_clip.items()}
     if made.shape[1] > 1:
-        spread = [space.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
+        spread = [axes * space.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
         summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
     if len(made) > 1:
         # Between the first samples of different clips, as in the paper; not within a long motion.
-        apart = space.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
+        apart = axes * space.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
         summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
     if ruler.network is not None:
         features = lambda poses: np.concatenate([ruler.network.clip_features(one) for one in poses])  # noqa: E731
         reference = features([one[inner] for one in pose])
         values = [frechet_distance(features(made[:, k]), reference).value for k in range(made.shape[1])]
-        summary["fgd"] = {"mean": float(np.mean(values)), "low": None, "high": None, "best": float(min(values))}
+        about = {"vectors": len(reference), "features": reference.shape[1]}
+        cell = {"mean": float(np.mean(values)), "low": None, "high": None, "best": float(min(values)), **about}
+        summary["fgd"] = cell
     return summary
+
+
+def check_vectors(ruler: Ruler, protocol: Protocol) -> None:
+    """Refuse a feature network whose clips are longer than what is generated.
+
+    Raises:
+        InputError: fewer than two feature vectors.
+    """
+    if ruler.network is not None:
+        clips = len(starts_of(ruler.corpus, protocol))
+        vectors_of([protocol.last - protocol.first] * clips, ruler.network.clip_frames, str(ruler.corpus.path))
 
 
 def _jerk(space: PoseSpace, places: Float[np.ndarray, "T P D"], fps: float) -> float:
@@ -127,19 +150,51 @@ def _summary(name: str, values: list[list[float]], rng: np.random.Generator) -> 
 
 
 def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str, Any]]:
-    """Scores of baselines: the truth, another clip's motion, the first pose held, and the mean pose."""
+    """Scores of baselines: the truth, another right motion for the audio (generated corpora only), another clip's
+    motion, the first pose held, the mean pose, and the FGD of two halves of the truth."""
+    check_vectors(ruler, protocol)
     starts = starts_of(ruler.corpus, protocol)
     _, pose = clips_of(ruler.corpus, protocol, starts)
     inner = pose[:, protocol.first : protocol.last]
     mean = np.asarray(ruler.corpus.space.valid(jnp.asarray(ruler.corpus.statistics["pose"].mean)))
+    right = right_clips(ruler, protocol, starts, seed)
     candidates = {
-        "truth": inner,
+        "truth": inner[:, None],
+        **({} if right is None else {"another right motion": right}),
         # A take may have a single clip.
-        **({"another clip's motion": np.roll(inner, len(inner) // 2, axis=0)} if len(inner) > 1 else {}),
-        "first pose held": np.broadcast_to(pose[:, protocol.first - 1 : protocol.first], inner.shape),
-        "mean pose": np.broadcast_to(mean[None, None], inner.shape),
+        **({"another clip's motion": np.roll(inner, len(inner) // 2, axis=0)[:, None]} if len(inner) > 1 else {}),
+        "first pose held": np.broadcast_to(pose[:, protocol.first - 1 : protocol.first], inner.shape)[:, None],
+        "mean pose": np.broadcast_to(mean[None, None], inner.shape)[:, None],
     }
-    return {
-        name: scores_of(np.asarray(made, np.float32)[:, None], ruler, protocol, starts, seed)
+    rows = {
+        name: scores_of(np.asarray(made, np.float32), ruler, protocol, starts, seed)
         for name, made in candidates.items()
     }
+    if ruler.network is not None:
+        reference = np.concatenate([ruler.network.clip_features(one) for one in inner])
+        if len(reference) >= 4:
+            floor = split_floor(reference, np.random.default_rng(seed))
+            rows[HALVES] = {"fgd": halves_cell(floor, reference.shape[1])}
+    return rows
+
+
+def right_clips(
+    ruler: Ruler, protocol: Protocol, starts: Int[np.ndarray, " N"], seed: int
+) -> Float[np.ndarray, "N samples frames R D"] | None:
+    """Other right motions of the scored frames, drawn from the talker; None for real recordings.
+
+    They are not continued from the clip's own first poses.
+    """
+    corpus, clips = ruler.corpus, {}
+    for segment in corpus.segments("test"):
+        inside = [int(start) for start in starts if segment.start <= start < segment.stop]
+        if not inside:
+            continue
+        motions = right_motions(corpus, segment, ruler.samples, seed)
+        if motions is None:
+            return None
+        for start in inside:
+            first = start - segment.start
+            rows = slice(first + protocol.first, first + protocol.last)
+            clips[start] = np.stack([motion[rows] for motion in motions])
+    return np.stack([clips[int(start)] for start in starts])

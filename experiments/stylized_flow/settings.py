@@ -1,7 +1,7 @@
 """Common settings of the tables of the stylized flow.
 
-All flows here have our linear first layer, so that only the paper's own parts differ; MoGlow is also trained as
-published, without it.
+The flow and MoGlow are trained as published and with our linear first layer, so that pairs of rows differ in the
+paper's own parts only.
 """
 
 from collections.abc import Mapping
@@ -46,6 +46,11 @@ PERCEPTUAL = {"perceptual_weight": 0.1}
 def flow(protocol: str, **changes: Any) -> Variant:
     """A flow on a protocol's clips, with its perceptual loss unless changed."""
     return Variant({**CLIPS[protocol], **PERCEPTUAL, **changes}, model="stylized_flow", training=TRAINING)
+
+
+def published(protocol: str) -> Variant:
+    """The flow without our linear first layer, on a protocol's clips, trained for as many steps as with it."""
+    return flow(protocol, predictor=False)
 
 
 def moglow(protocol: str, predictor: bool) -> Variant:

@@ -1,7 +1,7 @@
 """Steps of MoGlow in the time of one step of the flow, at the tables' sizes.
 
-    taskset -c 0 python -m experiments.stylized_flow.step_time --corpus TRINITY --features FEATURES \\
-        --corpus-ted TED --features-ted FEATURES_TED [--rounds 5]
+    taskset -c 0 python -m experiments.stylized_flow.step_time --corpus TRINITY --perceptual FEATURES \\
+        --corpus-ted TED --perceptual-ted FEATURES_TED [--rounds 5]
 
 The flow and both MoGlows take turns on one batch, so that other load on the machine affects all of them alike; medians
 over the turns. Writes ``results/step_time.json``, the source of ``settings.EQUAL``.
@@ -83,7 +83,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="turns of each (default: 5)")
     options = parser.parse_args()
     where = setting(options)
-    places = {"trinity": where, "ted": replace(where, corpus=options.corpus_ted, features=options.features_ted)}
+    ted = replace(where, corpus=options.corpus_ted, features=options.features_ted, perceptual=options.perceptual_ted)
+    places = {"trinity": where, "ted": ted}
     found = {name: measure(name, place, options.rounds) for name, place in places.items() if place.corpus is not None}
     print(found)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -6,8 +6,8 @@ from experiments.tables.runs import Setting, measure
 
 
 def with_nulls(table: str, where: Setting, protocol: Protocol) -> None:
-    """Score the truth, another clip's motion and static poses, once for a corpus and a feature network."""
-    ruler, measured = measure(where)
+    """Score the truth, other true motions and static poses, once for a corpus and a feature network."""
+    ruler, measured = measure(table, where)
     if any(record["steps"] == 0 and measured.items() <= record.items() for record in records(table)):
         return
     for name, scores in nulls(ruler, protocol).items():

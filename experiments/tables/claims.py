@@ -8,6 +8,11 @@ import numpy as np
 
 from experiments.tables.records import current
 
+#: A row stands still if its wrists' mean speed, or its diversity, is below this share of the truth's.
+STILL = 0.25
+#: Scores that do not depend on how samples move.
+_OF_DENSITY = ("bits_per_dim",)
+
 
 def over_seeds(table: str, variant: str, metric: str) -> tuple[float, float, int] | None:
     """Mean over seeds of a score, half the width of its 95 % interval (Student's t), and the number of seeds."""
@@ -57,10 +62,25 @@ class Claim:
     metric: str
     sign: int
     """1 if the claim is that ``first`` scores more than ``second``, -1 for less."""
+    baseline: str = ""
+    """The row that the claim compares the other one with; ``second`` if not given."""
+
+
+def stands_still(table: str, variant: str) -> bool:
+    """Whether a row hardly moves: by speed of the wrists or diversity, means over seeds, compared with the truth's."""
+    for metric in ("wrist_speed", "diversity"):
+        found, truth = over_seeds(table, variant, metric), over_seeds(table, "truth", metric)
+        if found is not None and truth is not None and found[0] < STILL * truth[0]:
+            return True
+    return False
 
 
 def judge(table: str, claim: Claim) -> str:
-    """``holds``, ``does not hold`` or ``undecided``, with the interval of the difference over seeds."""
+    """``holds``, ``does not hold`` or ``undecided``, with the interval of the difference over seeds.
+
+    Nothing is decided by a comparison with a baseline that stands still, and a row that stands still supports no claim;
+    it may contradict one.
+    """
     found = difference(table, claim.first, claim.second, claim.metric)
     if found is None or found[2] < 3:
         return "undecided: fewer than 3 seeds"
@@ -68,4 +88,11 @@ def judge(table: str, claim: Claim) -> str:
     verdict = "undecided"
     if abs(mean) > half:
         verdict = "holds" if mean * claim.sign > 0 else "does not hold"
+    if verdict != "undecided" and claim.metric not in _OF_DENSITY:
+        baseline = claim.baseline or claim.second
+        other = claim.first if baseline == claim.second else claim.second
+        if stands_still(table, baseline):
+            verdict = f"not decided ({baseline} stands still)"
+        elif verdict == "holds" and stands_still(table, other):
+            verdict = f"not decided ({other} stands still)"
     return f"{verdict}: {mean:+.3g} +- {half:.2g} over {count} seeds"

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from a2g_jax.evaluation.report import vectors_text
 from a2g_jax.evaluation.scores import METRICS as SCORED
 from a2g_jax.evaluation.scores import Metric
+from a2g_jax.metrics.units import OURS, Units, find_units
 from experiments.tables.claims import Claim, best_over_seeds, judge, over_seeds
 from experiments.tables.records import current, path_of
 from experiments.tables.runs import (
@@ -34,9 +36,9 @@ COLUMNS = (
 )
 #: Columns after them, by paper.
 _OTHERS = {
-    "audio2gestures": ("beat_alignment",),
+    "audio2gestures": ("beat_alignment", "wrist_speed"),
     "stylized_flow": (
-        *("beat_alignment", "jerk", "bits_per_dim", "chi", "silhouette", "chi_full", "silhouette_full"),
+        *("beat_alignment", "wrist_speed", "jerk", "bits_per_dim", "chi", "silhouette", "chi_full", "silhouette_full"),
         *("chi_shuffled", "silhouette_shuffled", "chi_clusters", "silhouette_clusters"),
     ),
 }
@@ -108,14 +110,16 @@ def render(
         name for name in (*COLUMNS, *_OTHERS[table.split("/")[0]]) if any(name in record["scores"] for record in found)
     ]
     names = [*rows, *dict.fromkeys(record["variant"] for record in found if record["steps"] == 0)]
-    head = " | ".join(f"{METRICS[name].title}{_unit(name, found)} {_ARROWS[METRICS[name].better]}" for name in columns)
+    shown = {name: _units(found).shown(METRICS[name]) for name in columns}
+    head = " | ".join(f"{each.title}{_unit(each, found)} {_ARROWS[each.better]}" for each in shown.values())
     lines = [f"# {title}", "", *_budget(found), "", f"| | seeds | {head} |", "|" + " --- |" * (len(columns) + 2)]
     for name in names:
-        cells = [_cell(table, name, metric) for metric in columns]
+        cells = [_cell(table, name, key, metric) for key, metric in shown.items()]
         seeds = len({record["seed"] for record in found if record["variant"] == name})
         if seeds:
             lines.append(f"| {name} | {seeds} | {' | '.join(cells)} |")
-    lines += ["", "Means over seeds +- half of a 95 % interval; in brackets the best of the samples.", ""]
+    best = "Means over seeds +- half of a 95 % interval; in brackets the best of the samples."
+    lines += ["", " ".join([best, *notes(table, found)]), ""]
     if claims:
         lines += ["The paper's claims, checked on our data (differences paired by seed):", ""]
         lines += [f"- {claim.text}: **{judge(table, claim)}**" for claim in claims]
@@ -123,7 +127,8 @@ def render(
     if paper:
         lines += [
             "The paper's figures, on **other data** (Trinity, S2G-Ellen or TED), another skeleton and another feature"
-            " network; they are comparable with ours only in order, not in value:",
+            " network; they are comparable with ours only in order, not in value"
+            f"{'' if _units(found) is OURS else ', though in the same units'}:",
             "",
             *(f"- {name}: {text}" for name, text in paper.items()),
             "",
@@ -131,23 +136,70 @@ def render(
     return "\n".join(lines)
 
 
-def _unit(name: str, found: Sequence[Mapping[str, Any]]) -> str:
+def _units(found: Sequence[Mapping[str, Any]]) -> Units:
+    """Units of records that fit into one table; those of 0.1 are in ours."""
+    return find_units(found[-1].get("units") or OURS.key)
+
+
+def notes(table: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Sentences on units, feature vectors and networks of the records."""
+    lines = [_units(found).describe] if _units(found).describe else []
+    models = {record["model"] for record in found if "model" in record}
+    if table.startswith("stylized_flow/") and models - {"stylized_flow"}:
+        lines.append("Flows are given the true first poses of each clip; the other models have none.")
+    scored = [record["scores"]["fgd"] for record in found if "fgd" in record["scores"]]
+    old = [record for record in found if "units" not in record]
+    if old and any("position_l1" in record["scores"] for record in old):
+        lines.append(
+            "These records are in our own units: L1 distances are sums over coordinates and means over our joints."
+        )
+    few = [score for score in scored if score.get("vectors", float("inf")) <= score.get("features", 0)]
+    if few:
+        lines.append(
+            f"FGD marked as of too few vectors for a covariance of {few[0]['features']} features is mostly the error of"
+            " that estimate."
+        )
+    if scored and all("vectors" not in score for score in scored):
+        clips = max((record.get("clips", 0) for record in found), default=0)
+        # By the flow's protocols a clip gives one vector.
+        lines.append(
+            f"FGD is of {clips} vectors of 128 features, which do not determine a covariance."
+            if table.startswith("stylized_flow/") and clips
+            else "They do not state the number of vectors behind FGD."
+        )
+    against = sorted({record["variant"] for record in old if _perceptual(record)})
+    if against and scored:
+        lines.append(
+            f"The losses of {', '.join(against)} used the feature network that FGD and LPIPS use, which favours these"
+            " rows."
+        )
+    return lines
+
+
+def _perceptual(record: Mapping[str, Any]) -> bool:
+    """Whether a row has a perceptual loss."""
+    return any(record.get("changes", {}).get(name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
+
+
+def _unit(metric: Metric, found: Sequence[Mapping[str, Any]]) -> str:
     """Unit of a column: centimetres or metres, or the corpus's own unit if it has no metres."""
-    unit = METRICS[name].unit
+    unit = metric.unit
     if any(record.get("unit", "cm") != "cm" for record in found):
         unit = unit.replace("cm", "units").replace("m/", "units/")
     return f", {unit}" if unit else ""
 
 
-def _cell(table: str, variant: str, metric: str) -> str:
-    found = over_seeds(table, variant, metric)
+def _cell(table: str, variant: str, name: str, metric: Metric) -> str:
+    found, digits = over_seeds(table, variant, name), metric.digits
     if found is None:
         return "-"
-    digits = METRICS[metric].digits
     mean, half, count = found
     text = f"{mean:.{digits}f}" + (f" +- {half:.{digits}f}" if count > 1 else "")
-    best = best_over_seeds(table, variant, metric)
-    return text if best is None or best == mean else f"{text} ({best:.{digits}f})"
+    best = best_over_seeds(table, variant, name)
+    if best is not None and best != mean:
+        text += f" ({best:.{digits}f})"
+    scores = next(r["scores"][name] for r in current(table) if r["variant"] == variant and name in r["scores"])
+    return text + vectors_text(scores)
 
 
 def _budget(found: Sequence[Mapping[str, Any]]) -> list[str]:

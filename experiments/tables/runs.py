@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.errors import InputError
 from a2g_jax.evaluation.evaluate import evaluate
 from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_network
 from a2g_jax.io.files import write_json
+from a2g_jax.metrics.units import OURS, Units, find_units
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.training.loop import train
@@ -45,6 +47,8 @@ class Ruler:
     corpus: Corpus
     network: FeatureNetwork | None
     samples: int
+    units: Units = OURS
+    split: str = "test"
 
 
 #: ``score(name, run, ruler, seed) -> fields of a record in addition to its conditions``: "scores", and others.
@@ -65,6 +69,8 @@ def whole_recordings(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, 
         network=ruler.network,
         audit=True,
         baselines=False,
+        units=ruler.units,
+        split=ruler.split,
     )
     return {
         "clips": result["about"]["clips"],
@@ -79,28 +85,36 @@ class Setting:
 
     corpus: Path
     features: Path | None
-    """Without a feature network there is no FGD and no LPIPS."""
+    """The network that scores; without one there is no FGD and no LPIPS."""
     runs: Path
     steps: int
     samples: int
     seeds: tuple[int, ...]
     minutes: float
     """Minutes after which no new training starts."""
+    perceptual: Path | None = None
+    """The network of perceptual losses, which is not the one that scores."""
+    split: str = "test"
+    """The split that is scored."""
 
 
-def arguments(description: str, steps: int = 1000) -> argparse.ArgumentParser:
+def arguments(description: str, steps: int = 1000, seeds: str = "0,1,2") -> argparse.ArgumentParser:
     """Command line of all tables.
 
     Args:
         steps: of the committed records, so that the plain command continues from them.
+        seeds: the default of ``--seeds``.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--corpus", type=Path, help="made by 'a2g prepare'; without one, the table is only rendered")
-    parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it")
+    parser.add_argument("--features", type=Path, help="a run of motion_autoencoder on it, for FGD and LPIPS")
+    parser.add_argument(
+        "--perceptual", type=Path, help="another such run, of another seed, for rows with a perceptual loss"
+    )
     parser.add_argument("--runs", type=Path, default=Path("runs"), help="folder for trained runs (default: runs)")
     parser.add_argument("--steps", type=int, default=steps, help="training steps of each run (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=20)
-    parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: 0,1,2)")
+    parser.add_argument("--seeds", default=seeds, help="comma-separated (default: %(default)s)")
     parser.add_argument("--budget", type=float, default=1e9, help="minutes after which no new training starts")
     parser.add_argument("--only", help="variants, comma-separated (default: all)")
     return parser
@@ -110,7 +124,14 @@ def setting(options: argparse.Namespace) -> Setting:
     """The setting given by the flags."""
     seeds = tuple(int(seed) for seed in options.seeds.split(","))
     return Setting(
-        options.corpus, options.features, options.runs, options.steps, options.samples, seeds, options.budget
+        options.corpus,
+        options.features,
+        options.runs,
+        options.steps,
+        options.samples,
+        seeds,
+        options.budget,
+        options.perceptual,
     )
 
 
@@ -128,7 +149,7 @@ def run_table(
         scored: what ``score`` is called; records of one run that were scored alike serve several tables.
     """
     began = time.monotonic()
-    ruler, measured = measure(where)
+    ruler, measured = measure(table, where)
     corpus = ruler.corpus
     conditions = {**measured, "steps": where.steps}
     for seed in where.seeds:
@@ -155,6 +176,7 @@ def run_table(
                 "scored": scored,
                 "model": variant.model,
                 "unit": corpus.space.unit,
+                "perceptual_network": None if config.perceptual is None else config.perceptual.fingerprint[:16],
                 "changes": {**variant.changes, **(variant.generation or {})},
                 "trained_steps": config.train_config.steps,
                 "train_seconds": seconds,
@@ -167,7 +189,7 @@ def run_table(
 
 def baselines(table: str, where: Setting) -> None:
     """Score the truth and the other baselines, once for a corpus and a feature network."""
-    ruler, fields = measure(where)
+    ruler, fields = measure(table, where)
 
     def found(name: str) -> list[dict[str, Any]]:
         return [
@@ -181,7 +203,9 @@ def baselines(table: str, where: Setting) -> None:
     # Records of another table on the same corpus are valid here.
     rows = next((found(name) for name in all_tables(table.split("/")[0]) if found(name)), None)
     if rows is None:
-        result = evaluate({}, ruler.corpus, samples=where.samples, seed=0, network=ruler.network)
+        result = evaluate(
+            {}, ruler.corpus, samples=where.samples, seed=0, network=ruler.network, units=ruler.units, split=ruler.split
+        )
         rows = [
             {"variant": row["name"], "seed": 0, **fields, "steps": 0, "scores": row["scores"]} for row in result["rows"]
         ]
@@ -189,16 +213,44 @@ def baselines(table: str, where: Setting) -> None:
         append(table, row)
 
 
-def measure(where: Setting) -> tuple[Ruler, dict[str, Any]]:
-    """The ruler of a setting, and the fields that identify it in records."""
+def measure(table: str, where: Setting) -> tuple[Ruler, dict[str, Any]]:
+    """The ruler of a setting, in the units of the table's paper, and the fields that identify it in records.
+
+    Raises:
+        InputError: the perceptual loss would use the network that scores.
+    """
     corpus = Corpus.open(where.corpus)
     network = None if where.features is None else load_feature_network(where.features, corpus)
     measured = {
         "corpus": name_of(corpus),
         "feature_network": None if network is None else network.fingerprint[:16],
         "samples": where.samples,
+        "units": units_of(table).key,
+        "split": where.split,
     }
-    return Ruler(corpus, network, where.samples), measured
+    ruler = Ruler(corpus, network, where.samples, units_of(table), where.split)
+    check_networks(where, ruler)
+    return ruler, measured
+
+
+def units_of(table: str) -> Units:
+    """The units of a table's paper, so that its figures can be compared with ours."""
+    return find_units(table.split("/")[0].replace("_", "-"))
+
+
+def check_networks(where: Setting, ruler: Ruler) -> None:
+    """Refuse a perceptual loss on the network that scores.
+
+    Raises:
+        InputError: ``--perceptual`` and ``--features`` have the same weights.
+    """
+    if where.perceptual is None or ruler.network is None:
+        return
+    if load_perceptual(where.perceptual, ruler.corpus).fingerprint == ruler.network.fingerprint:
+        raise InputError(
+            f"--perceptual: {where.perceptual} has the weights of --features {where.features}, which would favour the"
+            " rows with a perceptual loss; train another one (a2g train motion_autoencoder --seed 1)."
+        )
 
 
 def described(
@@ -228,7 +280,12 @@ def described(
         validate_every=steps,
     )
     needs = any(getattr(config, name, 0.0) > 0 for name in ("lpips_weight", "perceptual_weight"))
-    perceptual = load_perceptual(where.features, corpus) if needs and where.features is not None else None
+    if needs and where.perceptual is None:
+        raise InputError(
+            f"{name}: has a perceptual loss; give --perceptual a run of motion_autoencoder with another seed than that"
+            " of --features."
+        )
+    perceptual = load_perceptual(where.perceptual, corpus) if needs and where.perceptual is not None else None
     run = RunConfig.of(made.model, made.preset, config, training, corpus, perceptual).with_sampling(**sampling)
     return _digest(run, corpus, variant.generation), run
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,10 +14,11 @@ from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation import baselines as candidates
+from a2g_jax.evaluation import report_notes
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge, relevance
-from a2g_jax.evaluation.evaluate import BASELINES, check_runs, evaluate
-from a2g_jax.evaluation.feature_network import load_feature_network
-from a2g_jax.evaluation.report import check_comparable, latex, markdown, merge, write_report
+from a2g_jax.evaluation.evaluate import check_runs, evaluate
+from a2g_jax.evaluation.feature_network import check_separate, load_feature_network, vectors_of
+from a2g_jax.evaluation.report import BASELINES, HALVES, MOTIONS, check_comparable, latex, markdown, merge, write_report
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
 from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
 from a2g_jax.geometry.rotation import axis_angle_from_matrix
@@ -25,7 +27,7 @@ from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import RunConfig
+from a2g_jax.training.run import Perceptual, Run, RunConfig
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +115,70 @@ def test_other_right_motions_are_the_floor(result):
     assert score(result, "mean pose", "diversity") == 0.0 < score(result, right, "diversity")
 
 
+def test_a_held_pose_does_not_move(corpus, result):
+    """Its FGD is nearer to the truth than the mean pose's, so a table needs both rows."""
+    held = "first pose held"
+    for metric in ("diversity", "wrist_speed", "jerk"):
+        assert score(result, held, metric) == 0.0 < score(result, "truth", metric)
+    assert score(result, "another right motion", "wrist_speed") == pytest.approx(
+        score(result, "truth", "wrist_speed"), rel=0.5
+    )
+    pose = np.asarray(corpus.pose[:50])
+    np.testing.assert_array_equal(candidates.first_pose(pose)[[0, -1]], pose[[0, 0]])
+
+
+def test_every_fgd_states_its_number_of_vectors(result):
+    """Ten clips of twelve seconds, eight of them for training, give seven vectors of 50 frames each."""
+    cells = {row["name"]: row["scores"]["fgd"] for row in result["rows"]}
+    assert set(cells) == set(BASELINES)
+    floor = cells.pop(HALVES)
+    assert {(cell["vectors"], cell["features"]) for cell in cells.values()} == {(56, 24)}
+    assert (floor["vectors"], floor["mean"]) == (28, result["about"]["floor"])
+    assert floor["mean"] > 0.0 == pytest.approx(cells["truth"]["mean"], abs=1e-3)
+    assert f"{cells['mean pose']['mean']:.2f} (n = 56) |" in markdown(result)
+    assert "(n = 28) |" in markdown(result)
+    assert ", $n = 56$" in latex(result)
+
+
+def with_clips_of(network, frames):
+    """The network, its feature vectors taken from longer clips."""
+    config = network.run.config
+    changed = dataclasses.replace(config, model_config=dataclasses.replace(config.model_config, clip_frames=frames))
+    return dataclasses.replace(network, run=dataclasses.replace(network.run, config=changed))
+
+
+def test_few_vectors_are_marked_and_less_than_two_are_refused(corpus, network):
+    three = dataclasses.replace(corpus, splits={**corpus.splits, "few": corpus.splits["train"][:3]})
+    text = markdown(evaluate({}, three, split="few", network=network, samples=1))
+    assert "(n = 21, too few)" in text
+    assert "**21 vectors do not determine a covariance of 24 features" in text
+    with pytest.raises(InputError, match="test split: feature vectors are of 300 frames, and in clips of at most 360"):
+        evaluate({}, corpus, network=with_clips_of(network, 300), samples=1)
+    assert vectors_of([100, 49, 160], 50, "here") == (5, 1)
+    about = {"feature_vectors": 5, "feature_width": 24, "short_clips": 1, "clips": 3}
+    assert "**1 of 3 clips are shorter than a clip of the network" in report_notes.too_few(about)
+
+
+def test_a_run_trained_against_the_scoring_network_is_refused(corpus, network):
+    """Its loss made it score well. Another network's hash, or a loss that is off, is no objection."""
+    flow = dataclasses.replace(find_model("stylized_flow").presets["tiny"], perceptual_weight=0.1)
+
+    def run(model_config, fingerprint):
+        config = RunConfig.of("stylized_flow", "tiny", model_config, TRAIN_PRESETS["tiny"], corpus)
+        return Run(dataclasses.replace(config, perceptual=Perceptual(fingerprint)), {}, {}, 0)
+
+    against = run(flow, network.fingerprint)
+    with pytest.raises(InputError, match="mine: was trained with a loss on the feature network"):
+        evaluate({"mine": against}, corpus, network=network)
+    off = run(dataclasses.replace(flow, perceptual_weight=0.0), network.fingerprint)
+    check_separate({"another": run(flow, "another"), "off": off}, network)
+    check_separate({"mine": against}, None)
+
+
 def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config, network):
     config = dataclasses.replace(
         toy_run_config(), space=corpus.space, statistics=corpus.statistics, corpus={"emotions": [], "speakers": []}
     )
-    import jax
-
-    from a2g_jax.training.run import Run
-
     code = np.random.default_rng(0).uniform(0.5, 1.0, (4, config.model_config.code_channels)).astype(np.float32)
     run = Run(config, config.build().init(jax.random.key(0)), {"specific_mean": code, "specific_std": code}, 0)
     table = evaluate({"mine": run}, corpus, samples=3, network=network)
@@ -151,6 +209,17 @@ def test_what_cannot_be_compared_is_refused(result):
     check_comparable({"a": result, "b": result})
     with pytest.raises(InputError, match="a and b: cannot be compared: feature network is .* and another in the"):
         check_comparable({"a": result, "b": other})
+    paper = {**result, "about": {**result["about"], "units": "audio2gestures"}}
+    with pytest.raises(InputError, match="units is ours in one and audio2gestures in the other"):
+        check_comparable({"a": result, "b": paper})
+
+
+def test_a_report_of_the_first_version_says_how_it_scaled_errors(result):
+    """L1* was by the length of the bones; units were not stated."""
+    about = {key: value for key, value in result["about"].items() if key not in ("units", "wrist_to_wrist")}
+    check_comparable({"a": {**result, "about": about}, "b": {**result, "about": {**about, "units": "ours"}}})
+    assert "position L1* (by the bones' length, as in 0.1), cm" in markdown({**result, "about": about})
+    assert "position L1*, cm" in markdown(result)
 
 
 def test_neighbours_are_training_motion_found_by_audio(corpus):
@@ -180,6 +249,13 @@ def test_the_command_writes_its_report(corpus, tmp_path, capsys):
     assert main(command) == 0
     assert "| truth | 1 |" in capsys.readouterr().out
     assert {path.name for path in out.iterdir()} == {"report.json", "report.md", "report.tex", "report.png"}
+    assert main([*command, "--units", "audio2gestures"]) == 0
+    printed = capsys.readouterr().out
+    assert "speed L1, cm/frame ↓ | acceleration L1, cm/frame2 ↓" in printed
+    assert "on a skeleton of 120.64 cm" in printed
+    assert json.loads((out / "report.json").read_text())["about"]["units"] == "audio2gestures"
+    assert main([*command, "--units", "feet"]) == 2
+    assert "there are no 'feet'; there are: ours, audio2gestures, stylized-flow" in capsys.readouterr().err
     assert main([*command, "--split", "nothing"]) == 2
     assert "has no split 'nothing'" in capsys.readouterr().err
     assert main([*command, "--features", str(tmp_path)]) == 2
@@ -219,9 +295,10 @@ def test_reports_are_put_side_by_side(corpus, tmp_path, capsys):
     command = ["evaluate", "--compare", str(tmp_path / "first"), str(tmp_path / "second"), "--out", str(out)]
     assert main(command) == 0
     names = [row["name"] for row in json.loads((out / "report.json").read_text())["rows"]]
-    assert names == [f"mine ({tmp_path / 'first'})", f"mine ({tmp_path / 'second'})", *BASELINES]
+    assert names == [f"mine ({tmp_path / 'first'})", f"mine ({tmp_path / 'second'})", *MOTIONS]
     capsys.readouterr()
     assert main([*command[:4], "--out", str(out), "--corpus", str(corpus.path)]) == 2
+    assert main([*command, "--units", "audio2gestures"]) == 2
     assert main(["evaluate", "--compare", str(tmp_path), "--out", str(out)]) == 2
     assert "is no report" in capsys.readouterr().err
     other = {**table, "about": {**table["about"], "clips": 99}}
@@ -242,7 +319,7 @@ def test_speakers_are_grouped_by_their_motion_but_not_by_the_mean_pose(result):
 def test_the_reach_of_the_skeleton_scales_the_starred_error(corpus, result):
     row = next(row for row in result["rows"] if row["name"] == "mean pose")["scores"]
     reach = wrist_to_wrist(corpus.body)
-    assert 1.0 < reach < 1.6
+    assert reach == pytest.approx(1.364, abs=1e-5)
     expected = row["position_l1"]["mean"] * 1.2064 / reach
     assert row["position_l1_star"]["mean"] == pytest.approx(expected, rel=1e-6)
     assert row["position_l2"]["mean"] < row["position_l1"]["mean"]
@@ -288,7 +365,7 @@ def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("view", ["s2g", "ted"])
-def test_poses_without_a_skeleton_are_scored(view, tmp_path):
+def test_poses_without_a_skeleton_are_scored(view, tmp_path, monkeypatch):
     """Keypoints in their own unit, bones in metres; a model's samples too."""
     out = tmp_path / "corpus"
     assert main(["prepare", "talker", "--view", view, "--minutes", "8", "--seed", "3", "--out", str(out)]) == 0
@@ -313,3 +390,9 @@ def test_poses_without_a_skeleton_are_scored(view, tmp_path):
     names = [row["name"] for row in table["rows"]]
     assert "truth, 1 degree of noise" not in names
     assert "nearest neighbour in audio" in names
+    assert score(table, "another right motion", "multimodality") > 0
+    # Right motions are converted as the corpus's own are.
+    monkeypatch.setattr(candidates, "resample_motion", lambda recording, key: (recording.motion, None))
+    segment = flat.segments("test")[0]
+    (same,) = candidates.right_motions(flat, segment, 1, 0)
+    np.testing.assert_allclose(same, flat.pose[segment.start : segment.stop], atol=1e-4)

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import pytest
 
 from a2g_jax.models import find_model
-from experiments.audio2gestures import long, table1, table2, table3, table4, table5, table6
+from experiments.audio2gestures import long, select, table1, table2, table3, table4, table5, table6
 from experiments.audio2gestures import real as real_takes
 from experiments.stylized_flow import real as flow_takes
 from experiments.stylized_flow import table1 as flow_table1
@@ -18,7 +18,7 @@ TABLES = {
     "audio2gestures table 1, 2D": (table1.TABLES["audio2gestures/table1_2d"][1], "keypoints"),
     **{
         f"audio2gestures {module.__name__.split('.')[-1]}": (module.VARIANTS, "6d")
-        for module in (table2, table3, table4, table5, table6, real_takes, long)
+        for module in (table2, table3, table4, table5, table6, real_takes, long, select)
     },
     "flow table 1, Trinity": (flow_table1.rows("trinity"), "exponential"),
     "flow table 1, TED": (flow_table1.rows("ted"), "directions"),
@@ -43,6 +43,28 @@ def test_rows_can_be_made(name):
         assert row.trained_as in ("", *rows), title
         # Rows are named on the command line with commas between them.
         assert "," not in title or "table2" in name or name.endswith("long")
+
+
+def test_rows_named_after_a_paper_have_its_settings():
+    """Nothing of ours in them but size and time."""
+    paper = find_model("audio2gestures").presets["paper"]
+    row = table2.VARIANTS["full, the paper's weights"].changes
+    for name, value in {
+        "alignment_weight": 0.1,
+        "kl_shared_weight": 1e-3,
+        "kl_specific_weight": 1e-3,
+        "bicycle_weight": 0.1,
+        "diversity_weight": 0.1,
+        "speed_weight": 5.0,
+        "sampled_speed_weight": 0.0,
+        "relaxed_threshold": 0.002,
+    }.items():
+        assert row[name] == getattr(paper, name) == value
+    for protocol in ("trinity", "ted"):
+        rows = flow_table1.rows(protocol)
+        ours, published = rows["stylized flow"].changes, rows["stylized flow as published"].changes
+        assert published == {**ours, "predictor": False}
+        assert "adversarial_weight" not in rows["Speech2Gesture"].changes
 
 
 def test_only_the_losses_differ_on_takes():

@@ -1,6 +1,7 @@
 """Tables of the papers: records, intervals over seeds, and what is said of a claim."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,12 +9,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.training.run import Perceptual
+from experiments.audio2gestures import select
 from experiments.tables import records as store
+from experiments.tables import runs
 from experiments.tables.claims import Claim, difference, judge, over_seeds
 from experiments.tables.markdown import render
 from experiments.tables.records import all_tables, append, name_of, records
-from experiments.tables.runs import WHOLE, Setting, Variant, _same, described
+from experiments.tables.runs import WHOLE, Ruler, Setting, Variant, _same, check_networks, described, units_of
 
 TABLE = "audio2gestures/made_up"
 
@@ -24,10 +29,13 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "audio2gestures" / "results"
 
 
-def add(variant, seed, value, steps=100):
-    score = {"mean": value, "low": None, "high": None, "best": None}
+def cell(value, **more):
+    return {"mean": value, "low": None, "high": None, "best": None, **more}
+
+
+def add(variant, seed, value, steps=100, scores=None, **more):
     about = {"corpus": "c", "feature_network": None, "samples": 2, "steps": steps, "train_seconds": 60.0, "clips": 3}
-    append(TABLE, {"variant": variant, "seed": seed, **about, "scores": {"fgd": score}})
+    append(TABLE, {"variant": variant, "seed": seed, **about, **more, "scores": {"fgd": cell(value), **(scores or {})}})
 
 
 def test_the_last_of_equal_records_counts_and_lines_are_json(folder):
@@ -63,6 +71,94 @@ def test_differences_are_paired_by_seed_and_claims_judged_by_them(folder):
     assert judge(TABLE, Claim("b is smaller", "b", "a", "fgd", -1)).startswith("does not hold: +1")
     add("b", 2, 3.0)
     assert judge(TABLE, claim).startswith("undecided")
+
+
+def moving(speed, diversity=8.0):
+    return {"wrist_speed": cell(speed), "diversity": cell(diversity)}
+
+
+@pytest.mark.parametrize("still", [moving(0.1), moving(0.4, 1.0)])
+def test_a_baseline_that_stands_still_decides_nothing(folder, still):
+    """By either of wrist speed and diversity, below a quarter of the truth's."""
+    lower, more = Claim("lower", "ours", "theirs", "fgd", -1), Claim("more", "ours", "theirs", "bits_per_dim", -1)
+    add("truth", 0, 0.0, steps=0, scores=moving(0.5))
+    for seed in range(3):
+        add("ours", seed, 1.0 + 0.1 * seed, scores=moving(0.3) | {"bits_per_dim": cell(-2.0 + 0.1 * seed)})
+        add("theirs", seed, 9.0, scores=moving(0.2, 3.0) | {"bits_per_dim": cell(1.0)})
+    assert judge(TABLE, lower).startswith("holds: -7.9")
+    for seed in range(3):
+        add("theirs", seed, 9.0, scores=still | {"bits_per_dim": cell(1.0)})
+    assert judge(TABLE, lower).startswith("not decided (theirs stands still): -7.9")
+    assert judge(TABLE, more).startswith("holds")  # a density does not depend on how samples move
+    # A row that stands still contradicts a claim about itself, and supports none.
+    assert judge(TABLE, Claim("x", "theirs", "ours", "fgd", -1)).startswith("does not hold")
+    assert judge(TABLE, Claim("x", "theirs", "ours", "fgd", 1)).startswith("not decided (theirs stands still)")
+    assert judge(TABLE, Claim("x", "theirs", "ours", "fgd", -1, "theirs")).startswith(
+        "not decided (theirs stands still)"
+    )
+
+
+def test_a_table_is_in_the_units_of_its_records_and_states_vectors(folder):
+    speed = {"speed_l1": cell(0.6678)}
+    fgd = {"fgd": cell(2.0, vectors=64, features=128)}
+    for seed in range(3):
+        add("old", seed, 1.0, scores={"speed_l1": cell(12.4), "position_l1": cell(7.0)})
+    old = render(TABLE, "Made up", ["old"], (), {"A2G": "speed 0.668"})
+    assert "speed L1, cm/s ↓" in old
+    assert "These records are in our own units" in old
+    assert "do not state the number of vectors" in old
+    for seed in range(3):
+        add("ours", seed, 1.0, scores=speed | fgd, units="audio2gestures", split="test")
+    new = render(TABLE, "Made up", ["ours", "old"], (), {"A2G": "speed 0.668"})
+    assert "| ours | 3 | 0.668 +- 0.000 | 2.00 +- 0.00 (n = 64, too few) |" in new
+    assert "speed L1, cm/frame ↓" in new
+    assert "not in value, though in the same units:" in new
+    assert "too few vectors for a covariance of 128 features" in new
+    assert "| old |" not in new  # records in other units do not stand in one table
+
+
+def test_old_rows_with_a_perceptual_loss_are_marked(folder):
+    """Their loss used the network that scores."""
+    for name, changes in (("plain", {}), ("+ LPIPS", {"lpips_weight": 0.002})):
+        add(name, 0, 1.0, changes=changes)
+    assert "The losses of + LPIPS used the feature network" in render(TABLE, "Made up", ["plain"], (), {})
+
+
+def test_a_perceptual_loss_needs_a_network_that_does_not_score(toy_corpus, monkeypatch):
+    where = Setting(toy_corpus.path, Path("score"), Path("runs"), 100, 2, (0,), 1.0)
+    with pytest.raises(InputError, match="felt: has a perceptual loss; give --perceptual"):
+        described("felt", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, where)
+    monkeypatch.setattr(runs, "load_perceptual", lambda folder, corpus: Perceptual(str(folder), None))
+    own = replace(where, perceptual=Path("loss"))
+    config = described("felt", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, own)[1]
+    assert config.perceptual.fingerprint == "loss"
+    for weights, refused in (("loss", True), ("others", False)):
+        ruler = Ruler(toy_corpus, SimpleNamespace(fingerprint=weights), 2)
+        if refused:
+            with pytest.raises(InputError, match="--perceptual: loss has the weights of --features score"):
+                check_networks(own, ruler)
+        else:
+            check_networks(own, ruler)
+        check_networks(where, ruler)
+
+
+def test_a_table_is_scored_in_the_units_of_its_paper():
+    assert (units_of("audio2gestures/table1").key, units_of("stylized_flow/table1").key) == (
+        "audio2gestures",
+        "stylized-flow",
+    )
+
+
+def test_settings_are_chosen_on_seeds_that_are_not_reported(folder):
+    with pytest.raises(InputError, match="--seeds: the tables report 2; choose by others, from 10 on"):
+        select.check_seeds((2, 10))
+    select.check_seeds((10, 11))
+    first, second, still = list(select.CANDIDATES)[:3]
+    add_to = {"steps": 100, "corpus": "c", "samples": 2}
+    for name, fgd, speed in (("truth", 0.0, 0.5), (first, 9.0, 0.4), (second, 5.0, 0.3), (still, 1.0, 0.2)):
+        scores = {"fgd": cell(fgd), "wrist_speed": cell(speed)}
+        append(select.TABLE, {"variant": name, "seed": 10, **add_to, "scores": scores})
+    assert select.chosen() == second
 
 
 def test_runs_of_other_lengths_do_not_stand_in_one_table(folder):

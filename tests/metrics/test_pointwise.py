@@ -1,5 +1,7 @@
 """Frame-by-frame scores beside loops."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.metrics import pointwise as m
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 
 
 def pair(seed, frames=6, joints=4, width=3):
@@ -52,6 +55,45 @@ def test_another_size_of_body_is_brought_to_the_papers():
     a, b = pair(2)
     np.testing.assert_allclose(m.position_l1_star(a, b, 1.2064), m.position_l1(a, b), rtol=1e-6)
     np.testing.assert_allclose(m.position_l1_star(2 * a, 2 * b, 2 * 1.2064), m.position_l1(a, b), rtol=1e-5)
+
+
+def test_weights_count_a_joint_as_often_as_they_say():
+    """A mean weighted by (1, 2, 4, 1) / 8 is that over joints repeated so often."""
+    a, b = pair(7)
+    weights = np.array([1, 2, 4, 1], np.float32) / 8
+    often = np.repeat(np.arange(4), [1, 2, 4, 1])
+    for score in (m.position_l1, m.speed_l1, m.acceleration_l1):
+        np.testing.assert_allclose(score(a, b, weights=weights), score(a[:, often], b[:, often]), rtol=1e-5)
+    np.testing.assert_allclose(m.pck(a, b, 1.5, weights), m.pck(a[:, often], b[:, often], 1.5), rtol=1e-6)
+
+
+def turned_arms(angle, bend=0.0):
+    """The talker's skeleton with another rest pose: arms lowered and elbows bent by radians."""
+    offsets, names = np.asarray(TALKER_SKELETON.offsets).copy(), TALKER_SKELETON.names
+    for sign, side in ((1, "L"), (-1, "R")):
+        for name, by in (("Elbow", angle), ("Wrist", angle + bend)):
+            row = names.index(f"{side}_{name}")
+            length = np.linalg.norm(offsets[row])
+            offsets[row] = length * np.array([sign * np.cos(by), -np.sin(by), 0.0])
+    return replace(TALKER_SKELETON, offsets=offsets)
+
+
+@pytest.mark.parametrize(("angle", "bend"), [(0.0, 0.0), (0.8, 0.0), (1.5, 0.0), (-1.5, 0.0), (0.3, 1.0)])
+def test_the_reach_is_that_of_a_t_pose_whatever_the_rest_pose(angle, bend):
+    """1.364 m, not the 1.541 m of the bones, whose collars are slanted."""
+    assert m.wrist_to_wrist(turned_arms(angle, bend)) == pytest.approx(1.364, abs=1e-5)
+    lengths = np.linalg.norm(np.asarray(TALKER_SKELETON.offsets), axis=-1)
+    arms = [n for n, name in enumerate(TALKER_SKELETON.names) if name[2:] in ("Collar", "Shoulder", "Elbow", "Wrist")]
+    assert lengths[arms].sum() == pytest.approx(1.541, abs=1e-3)
+
+
+def test_a_rest_pose_that_is_nearly_a_t_pose_is_measured_as_it_is():
+    """As SMPL-X's, whose arms slope by a few degrees."""
+    slight = turned_arms(0.1)
+    assert m.wrist_to_wrist(slight) == pytest.approx(0.344 + 1.02 * np.cos(0.1), abs=1e-5)
+    assert m.wrist_to_wrist(slight.scaled(0.5)) == pytest.approx(0.5 * m.wrist_to_wrist(slight), rel=1e-6)
+    nameless = replace(TALKER_SKELETON, names=tuple(f"joint{n}" for n in range(22)))
+    assert m.wrist_to_wrist(nameless) is None
 
 
 def test_joint_rotation_error_is_scipys_magnitude_whatever_both_are_turned_by():
