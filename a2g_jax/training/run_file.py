@@ -23,7 +23,7 @@ SHIPPED_FEATURES = {"demo": "demo_features"}
 #: Sampling settings that runs of version 0.1 kept among those of the model, by their names then.
 _MOVED = {"control_curves": "controls"}
 
-#: Settings of older versions that are gone, with the value at which they had no effect.
+#: Settings of version 0.1 that are gone, with the value at which they had no effect.
 _RETIRED = {"noise_frames": 1}
 
 
@@ -68,7 +68,7 @@ def split_settings(entry: Entry, values: dict[str, Any], about: Path) -> tuple[d
         for name, default in _RETIRED.items():
             if part.get(name, default) != default:
                 raise InputError(
-                    f"{about}: has {name} {part[name]}, which only versions up to 0.2 have; train it again."
+                    f"{about}: has {name} {part[name]}, a setting of version 0.1; train it again."
                 )
     settings = {name: value for name, value in settings.items() if name not in _RETIRED}
     if sampling is not None:

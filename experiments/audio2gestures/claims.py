@@ -19,7 +19,7 @@ BASELINE, FULL = "baseline", "+ diversity loss"
 RHYTHM_ROWS = (
     "baseline",
     "+ diversity loss",
-    "full, paper's losses on samples",
+    "full, authors' losses on samples",
     "full, no loss on samples",
 )
 

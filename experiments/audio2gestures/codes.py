@@ -75,33 +75,28 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
     pairs = [(a, b) for a, b in zip(left[:count], right[:count], strict=True)]
     pairs += [(b, a) for a, b in pairs]
 
-    def specific_of(params, pose):
-        return codec.encode_motion(params, pose)[1].mean
+    @jax.jit
+    def decoded(params, shared, specific):
+        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(specific))
 
     @jax.jit
-    def exchanged(params, pose_a, audio_a, pose_b):
-        shared = codec.encode_motion(params, pose_a)[0].mean
-        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(specific_of(params, pose_b)))
+    def codes(params, pose, audio):
+        shared, specific = codec.encode_motion(params, pose)
+        return shared.mean, codec.encode_audio(params, audio).mean, specific.mean
 
-    @jax.jit
-    def of_audio(params, pose_a, audio_a, pose_b):
-        shared = codec.encode_audio(params, audio_a).mean
-        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(specific_of(params, pose_b)))
+    def drawn(params, specific):
+        return codec.map_noise(params, code_noise(jax.random.key(seed), specific)).mean
 
-    @jax.jit
-    def drawn(params, pose_a, audio_a, pose_b):
-        shared = codec.encode_audio(params, audio_a).mean
-        mapped = codec.map_noise(params, code_noise(jax.random.key(seed), specific_of(params, pose_b)))
-        return codec.decode(params, codec.to_frames(shared), codec.specific_to_frames(mapped.mean))
-
-    decodings = {"": exchanged, "audio_": of_audio}
-    if "mapping_net" in run.params:
-        decodings["drawn_"] = drawn
     firsts, seconds = [a for a, _ in pairs], [b for _, b in pairs]
     peaks = [speed_peaks(one.max(axis=1), fps) for one in speeds]
     figures: dict[str, list[float]] = {}
-    for prefix, decode in decodings.items():
-        poses = np.asarray(decode(run.params, clips[firsts], features[firsts], clips[seconds]))
+    of_motion, of_audio, _ = codes(run.params, clips[firsts], features[firsts])
+    specific = codes(run.params, clips[seconds], features[seconds])[2]
+    decodings = {"": (of_motion, specific), "audio_": (of_audio, specific)}
+    if "mapping_net" in run.params:
+        decodings["drawn_"] = (of_audio, jax.jit(drawn)(run.params, specific))
+    for prefix, pair in decodings.items():
+        poses = np.asarray(decoded(run.params, *pair))
         rows: dict[str, list[float]] = {name: [] for name in _FIGURES}
         for (a, b), pose in zip(pairs, poses, strict=True):
             ours = wrist_speeds(space, pose, fps)

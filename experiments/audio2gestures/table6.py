@@ -11,8 +11,8 @@ from experiments.tables.markdown import make
 from experiments.tables.runs import Variant
 
 DCT = "A2G with DCT"
-#: Bands have no temporal order, so their noise is independent as well; 128 points need clips of 128 frames.
-_SETTINGS = {**BASE, "latent": "dct", "noise_frames": 1, "clip_frames": 128}
+#: Bands take the place of steps of several frames; 128 points need clips of 128 frames.
+_SETTINGS = {**BASE, "latent": "dct", "specific_frames": 1, "specific_jitter": 0}
 
 
 def _edited(*edits: str) -> Variant:

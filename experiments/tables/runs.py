@@ -167,7 +167,7 @@ def run_table(
             if twin is not None:
                 append(table, {**twin, "variant": name})
                 continue
-            run, seconds, computing = _trained(config, variant, corpus, where)
+            run, seconds, computing = trained(config, variant, corpus, where)
             if variant.trained_as:
                 seconds = computing = 0.0  # counted with the variant that was trained
             record = {
@@ -317,7 +317,7 @@ def _same(table: str, digest: str, conditions: Mapping[str, Any], scored: str) -
     return None
 
 
-def _trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Run, float, float]:
+def trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting) -> tuple[Run, float, float]:
     """Run of a variant, trained if necessary, and the seconds of the call that finished it: wall clock and
     processor."""
     folder = where.runs / _digest(config, corpus, None)
