@@ -72,9 +72,9 @@ class Audio2GesturesConfig:
     """Training steps of a second stage, in which the decoder is trained against a discriminator; none in the papers."""
     discriminator_channels: tuple[int, ...] = (64, 96, 128, 128)
     """Convolutions of the discriminator, each at half the rate of the one before."""
-    adversarial_weight: float = 0.1
+    adversarial_weight: float = 0.2
     """Weight of the adversarial loss in that stage, of encoded and of drawn codes."""
-    matching_weight: float = 0.2
+    matching_weight: float = 0.4
     """Weight of the distance of the discriminator's features between the motion of encoded codes and the truth."""
 
     clip_frames: int = 128
