@@ -76,6 +76,11 @@ TOY_MODEL = {
     "head_channels": 8,
     "code_channels": 4,
     "clip_frames": 16,
+    "specific_frames": 1,
+    "specific_jitter": 0,
+    "smoothing": 0,
+    "stored_codes": False,
+    "adversarial_steps": 0,
 }
 
 

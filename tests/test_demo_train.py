@@ -6,7 +6,6 @@ from conftest import TOY_MODEL
 
 from a2g_jax.cli import demo, main
 from a2g_jax.models import find_model
-from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker import recordings
 
 
@@ -14,9 +13,12 @@ def test_demo_trains(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(demo, "DEMO_MINUTES", 0.3)
     monkeypatch.setattr(recordings, "RECORDING_SECONDS", 6.0)
     entry = find_model("audio2gestures")
-    monkeypatch.setitem(entry.presets, "tiny", dataclasses.replace(entry.presets["tiny"], **TOY_MODEL))
-    small = dataclasses.replace(TRAIN_PRESETS["tiny"], steps=6, batch_size=2, checkpoint_every=3)
-    monkeypatch.setitem(TRAIN_PRESETS, "tiny", small)
+    # The preset's own structure: codes of training clips at a low rate, and two stages of training.
+    changes = {"specific_frames": 4, "specific_jitter": 2, "smoothing": 2, "stored_codes": True, "adversarial_steps": 2}
+    toy = dataclasses.replace(entry.presets["tiny"], **{**TOY_MODEL, **changes, "discriminator_channels": (8, 8)})
+    monkeypatch.setitem(entry.presets, "tiny", toy)
+    small = dataclasses.replace(entry.training["tiny"], steps=4, batch_size=2, checkpoint_every=3)
+    monkeypatch.setitem(entry.training, "tiny", small)
     out = tmp_path / "demo"
     command = ["demo", "--train", "--out", str(out), "--samples", "1", "--formats", "npz"]
     assert main(command) == 0

@@ -57,12 +57,10 @@ def _train(out: Path) -> Any:
     from a2g_jax.data.generated import TalkerOptions
     from a2g_jax.data.prepare import prepare_talker
     from a2g_jax.models import find_model
-    from a2g_jax.models.train_config import TRAIN_PRESETS
     from a2g_jax.training.start import run_training
 
     if not (out / "corpus").exists():
         prepare_talker(out / "corpus", TalkerOptions(minutes=DEMO_MINUTES))
-    model = find_model("audio2gestures").presets["tiny"]
-    return run_training(
-        "audio2gestures", "tiny", model, TRAIN_PRESETS["tiny"], out / "corpus", out / "run", resume=True
-    )
+    entry = find_model("audio2gestures")
+    model, training = entry.presets["tiny"], entry.training_preset("tiny")
+    return run_training("audio2gestures", "tiny", model, training, out / "corpus", out / "run", resume=True)

@@ -67,9 +67,7 @@ def split_settings(entry: Entry, values: dict[str, Any], about: Path) -> tuple[d
     for part in (settings, sampling or {}):
         for name, default in _RETIRED.items():
             if part.get(name, default) != default:
-                raise InputError(
-                    f"{about}: has {name} {part[name]}, a setting of version 0.1; train it again."
-                )
+                raise InputError(f"{about}: has {name} {part[name]}, a setting of version 0.1; train it again.")
     settings = {name: value for name, value in settings.items() if name not in _RETIRED}
     if sampling is not None:
         return settings, {name: value for name, value in sampling.items() if name not in _RETIRED}
