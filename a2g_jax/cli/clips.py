@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--pin-shared",
         type=share,
         metavar="SHARE",
-        help="weight of the clip's own shared code against the audio's (default: 0, as in the paper)",
+        help="weight of the clip's own shared code against the audio's (default: 1; 0 as in the paper)",
     )
     pin.add_argument(
         "--pin-corpus",

@@ -28,7 +28,7 @@ from experiments.tables.records import results
 
 SECONDS = 12.0
 #: Seconds of blending, and weight of the clip's own shared code.
-SETTINGS = ((0.25, 0.0), (0.5, 0.0), (0.75, 0.0), (0.5, 1.0))
+SETTINGS = ((0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (0.75, 0.0))
 ERRORS = ("error_cm", "unpinned_error_cm", "wrist_error_cm", "unpinned_wrist_error_cm")
 
 

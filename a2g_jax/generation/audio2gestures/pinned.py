@@ -28,8 +28,12 @@ class Pins:
     """Each ``FILE@SECOND`` or ``FILE@SECOND+LENGTH``."""
     blend: float = 0.75
     """Seconds of blending on either side of a clip."""
-    shared: float = 0.0
-    """Share of a clip's own shared code that replaces the audio's, from 0 to 1."""
+    shared: float = 1.0
+    """Share of a clip's own shared code that replaces the audio's, from 0 to 1.
+
+    0 as in the paper, whose motion-specific code determines nearly everything. One at a lower rate leaves the times of
+    the strokes to the shared code: with the audio's, a pinned clip gestures to the speech instead of as it was.
+    """
     corpus: Corpus | None = None
     """Its 99th percentile of wrist jerk limits seams; without one, that of the clips and the unpinned sample."""
 
