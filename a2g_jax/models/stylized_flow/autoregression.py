@@ -84,7 +84,7 @@ def start(
     history = jnp.zeros(shape) if seed is None else jnp.broadcast_to(seed[None], shape)
     last = jnp.concatenate([history[:, :1], history], axis=1)[:, -2:]
     runs = count if how.guidance == 1.0 else 2 * count
-    return State(history, last, first_states(prepare(params["glow"]), networks.shape, runs))
+    return State(history, last, first_states(prepare(params["glow"]), networks.shape, runs, history.dtype))
 
 
 def proceed(

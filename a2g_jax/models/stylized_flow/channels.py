@@ -26,7 +26,7 @@ class Channels:
         """
         self._statistics, self.stride = statistics, stride
         self.rows: tuple[int, int] = statistics.mean.shape  # type: ignore[assignment]
-        self.kept = np.flatnonzero(np.asarray(statistics.std).reshape(-1) >= least_std)
+        self.kept = np.flatnonzero(np.asarray(statistics.std).reshape(-1) >= least_std).astype(np.int32)
         if len(self.kept) < 2:
             raise InputError(f"--least-std {least_std:g}: leaves {len(self.kept)} channels; give a smaller one.")
 

@@ -23,7 +23,7 @@ from a2g_jax.nn.flow.priors import log_prob
 
 
 def log_likelihood(
-    networks: FlowNetworks, params: Params, flat: Float[Array, "B T C"], given: Conditioning
+    networks: FlowNetworks, params: Params, flat: Float[Array, "B M C"], given: Conditioning
 ) -> tuple[Float[Array, "B N"], Float[Array, "B N C"]]:
     """Log-density of each frame in nats, and the latents.
 

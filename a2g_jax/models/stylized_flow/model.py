@@ -232,7 +232,7 @@ def _likelihood(networks: FlowNetworks) -> Any:
     """A function of clips: the mean bits per frame, and terms."""
 
     def bits(
-        params: Params, flat: Float[Array, "B T C"], given: Conditioning
+        params: Params, flat: Float[Array, "B M C"], given: Conditioning
     ) -> tuple[Float[Array, ""], dict[str, Array]]:
         log_density, z = log_likelihood(networks, params, flat, given)
         per_frame = -jnp.mean(log_density) / math.log(2.0)
@@ -249,7 +249,7 @@ def _reverse(networks: FlowNetworks) -> Any:
         params: Params,
         key: Key[Array, ""],
         pose: Float[Array, "B T R D"],
-        flat: Float[Array, "B T C"],
+        flat: Float[Array, "B M C"],
         given: Conditioning,
     ) -> tuple[Float[Array, ""], Float[Array, ""]]:
         inner = networks.inner(flat)
