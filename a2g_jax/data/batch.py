@@ -25,6 +25,10 @@ class Batch(NamedTuple):
     """Whether a word starts within each frame."""
     waveform: Float[Array, "B samples"] | None = None
     """The audio itself, from -1 to 1: ``round(T * sample_rate / fps)`` samples."""
+    other_pose: Float[Array, "B T R D"] | None = None
+    """Poses of another clip of the same recording: of the same speaker, at another place."""
+    mirrored: Bool[Array, " B"] | None = None
+    """Whether left and right of a clip's poses are exchanged; None without that augmentation."""
 
 
 #: Arrays of a corpus or a part by name: a row a frame, and ``waveform`` with a row a sample.
@@ -37,8 +41,8 @@ class Field(NamedTuple):
     """How a field of a batch is gathered from the arrays of a corpus."""
 
     kind: str
-    """``frames``: a slice of the clip's frames; ``label``: the value at the clip's first frame; ``samples``: a slice of
-    samples, which begins where the second array says."""
+    """``frames``: a slice of the clip's frames; ``others``: the same of another clip of the recording; ``label``: the
+    value at the clip's first frame; ``samples``: a slice of samples, which begins where the second array says."""
     arrays: tuple[str, ...]
     """Names of :meth:`a2g_jax.data.corpus.Corpus.array`."""
 
@@ -52,6 +56,7 @@ FIELDS: dict[str, Field] = {
     "words": Field("frames", ("words",)),
     "word_starts": Field("frames", ("word_starts",)),
     "waveform": Field("samples", ("waveform", "waveform_start")),
+    "other_pose": Field("others", ("pose",)),
 }
 
 
@@ -66,7 +71,12 @@ class ClipShape(NamedTuple):
     @property
     def arrays(self) -> tuple[str, ...]:
         """Names of the corpus arrays that these fields are gathered from."""
-        return tuple(name for field in self.fields for name in FIELDS[field].arrays)
+        return tuple(dict.fromkeys(name for field in self.fields for name in FIELDS[field].arrays))
+
+    @property
+    def paired(self) -> bool:
+        """Whether any field is of another clip of the same recording."""
+        return any(FIELDS[field].kind == "others" for field in self.fields)
 
 
 def clip_shape(fields: tuple[str, ...], frames: int, fps: float, sample_rate: int) -> ClipShape:
@@ -83,12 +93,15 @@ def clip_shape(fields: tuple[str, ...], frames: int, fps: float, sample_rate: in
     return ClipShape(ordered, frames, round(frames * sample_rate / fps))
 
 
-def gather_clips(arrays: Arrays, shape: ClipShape, starts: Int[Any, " B"], take: Gather) -> dict[str, Any]:
+def gather_clips(
+    arrays: Arrays, shape: ClipShape, starts: Int[Any, " B"], take: Gather, others: Int[Any, " B"] | None = None
+) -> dict[str, Any]:
     """Raw fields of the clips that begin at the given rows.
 
     Args:
         arrays: those that ``shape.arrays`` names.
         take: :func:`gather` for arrays on the device, :func:`gather_from_disk` for others.
+        others: first rows of other clips of the same recordings; needed where ``shape.paired``.
     """
     clips: dict[str, Any] = {}
     for name in shape.fields:
@@ -96,6 +109,8 @@ def gather_clips(arrays: Arrays, shape: ClipShape, starts: Int[Any, " B"], take:
         first, *rest = (arrays[array] for array in field.arrays)
         if field.kind == "frames":
             clips[name] = take(first, starts, shape.frames)
+        elif field.kind == "others":
+            clips[name] = take(first, others, shape.frames)
         elif field.kind == "label":
             clips[name] = first[starts]
         else:

@@ -1,6 +1,6 @@
 """Random clips of a corpus, as a function of a key alone."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -63,6 +63,16 @@ def draw_starts(key: Key[Array, ""], crops: Crops, batch_size: int) -> Int[Array
     return jnp.asarray(crops.first)[segment] + drawn - before
 
 
+def draw_others(key: Key[Array, ""], crops: Crops, starts: Int[Array, " B"]) -> Int[Array, " B"]:
+    """First rows of a second random clip of each clip's stretch, every start of it equally likely."""
+    order = np.argsort(crops.first)
+    first, counts = crops.first[order], np.diff(crops.cumulative, prepend=0)[order].astype(np.int32)
+    segment = jnp.searchsorted(jnp.asarray(first), starts, side="right") - 1
+    share = jax.random.uniform(key, starts.shape)
+    count = jnp.asarray(counts)[segment]
+    return jnp.asarray(first)[segment] + jnp.minimum((share * count).astype(jnp.int32), count - 1)
+
+
 @dataclass(frozen=True)
 class BatchMaker:
     """Makes the batch that a model is trained on of raw clips."""
@@ -70,9 +80,13 @@ class BatchMaker:
     audio_statistics: Statistics
     augmentation: float
     """Strength of :func:`~a2g_jax.features.augment.augment_log_mel`; 0 for none."""
+    mirror: float = 0.0
+    """Share of the clips whose left and right are exchanged."""
+    mirror_pose: Callable[[Any], Any] | None = None
+    """:func:`a2g_jax.geometry.mirror_poses.pose_mirror`; needed where clips are mirrored."""
 
     def __call__(self, key: Key[Array, ""] | None, clips: Mapping[str, Any]) -> Batch:
-        """Audio features normalised, and augmented when a key is given; waveforms from -1 to 1.
+        """Audio features normalised, and clips augmented when a key is given; waveforms from -1 to 1.
 
         Args:
             clips: raw fields, of :func:`a2g_jax.data.batch.gather_clips`.
@@ -84,7 +98,23 @@ class BatchMaker:
         fields = {**clips, "audio": self.audio_statistics.normalise(audio)}
         if "waveform" in fields:
             fields["waveform"] = jnp.asarray(fields["waveform"], jnp.float32) / 32768.0
+        if self.mirror > 0 and self.mirror_pose is not None:
+            fields |= self._mirrored(key, fields)
         return Batch(**fields)
+
+    def _mirrored(self, key: Key[Array, ""] | None, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """Poses of clips, a share of them mirrored when a key is given, and which ones."""
+        count = len(fields["pose"])
+        if key is None or self.mirror_pose is None:
+            return {"mirrored": jnp.zeros(count, bool)}
+        # Beside the keys of the clips' audio.
+        chosen = jax.random.bernoulli(jax.random.fold_in(key, 2**31), self.mirror, (count,))
+        poses = {
+            name: jnp.where(chosen[:, None, None, None], self.mirror_pose(fields[name]), fields[name])
+            for name in ("pose", "other_pose")
+            if name in fields
+        }
+        return {"mirrored": chosen, **poses}
 
 
 def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " clips"]:
@@ -96,3 +126,14 @@ def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " c
         start for segment in corpus.segments(split) for start in range(segment.start, segment.stop - frames + 1, frames)
     ]
     return np.array(starts, np.int32)
+
+
+def opposite_starts(
+    corpus: Corpus, split: str, frames: int, starts: Int[np.ndarray, " clips"]
+) -> Int[np.ndarray, " clips"]:
+    """First rows of other clips of the same stretches, half a stretch away; nothing is drawn."""
+    segments = sorted(corpus.segments(split), key=lambda segment: segment.start)
+    index = np.searchsorted([segment.start for segment in segments], starts, side="right") - 1
+    first = np.array([segments[number].start for number in index])
+    count = np.array([segments[number].frames - frames + 1 for number in index])
+    return (first + (starts - first + count // 2) % count).astype(np.int32)

@@ -148,7 +148,7 @@ class Corpus:
             InputError: the corpus holds keypoints or directions.
         """
         if not self.space.has_rotations:
-            remedy = "this needs a corpus of rotations (prepared with --pose 6d or exponential)"
+            remedy = "this needs a corpus of rotations (prepared with --pose 6d, exponential or euler)"
             raise InputError(f"{self.path}: holds {self.space.noun} and no skeleton; {remedy}.")
 
     def require_pose(self, *kinds: str) -> None:

@@ -51,6 +51,8 @@ PRESETS: dict[str, Features] = {
     ),
     # The flow on Trinity, after StyleGestures: 27 bands at 20 frames a second, exponential maps.
     "stylized-flow": Features(fps=20.0, mel=MelConfig(bands=27, range_db=_PUBLISHED_RANGE), pose="exponential"),
+    # Our small flow: every degree of freedom of a joint is a number of its own, at 30 frames a second.
+    "tiny-flow": Features(mel=MelConfig(bands=27, range_db=_PUBLISHED_RANGE), pose="euler"),
     # The flow on TED: 29 bands and directions of bones at 15 frames a second.
     "stylized-flow-ted": Features(
         fps=15.0, mel=MelConfig(bands=29, range_db=_PUBLISHED_RANGE), pose="directions", joints="all"

@@ -46,7 +46,7 @@ class Likelihood(NamedTuple):
     """Values of the clips, for paired differences of models on the same clips."""
     clean_clips: Float[np.ndarray, " clips"]
     dimensions: int
-    """Values of a frame."""
+    """Values of a frame that have a density."""
     frames: int
     """Scored frames of each clip."""
     floor: float
@@ -96,8 +96,10 @@ def gaussian_bits_per_dim(
         InputError: see :func:`bits_per_dim`, for all splits.
     """
     gaussian, rows = fit_gaussian(config, corpus, seed, most_clips), conditioning_rows(config)
+    # As the model's own, spread over the frames up to the next pose.
+    stride = density_of(config).stride
     return _likelihood(
-        config, corpus, split, seed, lambda clips: gaussian.log_density(*rows(clips)).reshape(clips.kept, -1)
+        config, corpus, split, seed, lambda clips: gaussian.log_density(*rows(clips)).reshape(clips.kept, -1) / stride
     )
 
 
@@ -144,7 +146,7 @@ def conditioning_rows(config: RunConfig) -> Callable[[Clips], tuple[np.ndarray, 
 
 def _likelihood(config: RunConfig, corpus: Corpus, split: str, seed: int, log_likelihood: _LogLikelihood) -> Likelihood:
     starts, noise = clip_starts(config, corpus, split), density_of(config).noise
-    dimensions = config.statistics["pose"].mean.size
+    dimensions = density_of(config).dimensions
 
     def bits(noise: float) -> Float[np.ndarray, " clips"]:
         batches = clip_batches(config, corpus, starts, noise, seed)
@@ -153,5 +155,6 @@ def _likelihood(config: RunConfig, corpus: Corpus, split: str, seed: int, log_li
 
     noisy, clean = bits(noise), bits(0.0)
     noisy_mean, clean_mean = (bootstrap_mean(values, np.random.default_rng(seed)) for values in (noisy, clean))
-    floor = math.log2(noise * math.sqrt(2 * math.pi * math.e)) if noise > 0 else -math.inf
+    entropy = math.log2(noise * math.sqrt(2 * math.pi * math.e)) if noise > 0 else -math.inf
+    floor = entropy / density_of(config).stride
     return Likelihood(noisy_mean, clean_mean, noisy, clean, dimensions, scored_frames(config), floor)

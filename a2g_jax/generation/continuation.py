@@ -73,7 +73,8 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
         del summary  # its limits of poses are for generation of minutes
 
         def one_clip(keys, audio, pose):
-            given = jax.tree.map(lambda array: array[first:last], condition(params, {}, Condition(audio)))
+            stop = last + model.overlap
+            given = jax.tree.map(lambda array: array[first:stop], condition(params, {}, Condition(audio)))
             seeds = pose[first - history : first]
 
             def one(key):

@@ -62,7 +62,8 @@ class Engine:
         @jax.jit
         def advance(params, summary, keys, condition, start, state):
             assert proceed is not None
-            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self.halo, window), condition)
+            rows = window + model.overlap
+            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self.halo, rows), condition)
             lanes = jax.vmap(proceed, in_axes=(None, None, 0, None, None, 0))
             pose, state = lanes(params, summary, keys, cut, start + self.halo, state)
             return space.valid(pose), state
@@ -149,6 +150,7 @@ class Engine:
                 speaker=given.speaker,
                 words=None if words is None else words[rows],
                 seed_poses=self._seeds(given),
+                style=given.style,
                 **jax.tree.map(lambda array, rows=rows: array[rows], held),
             )
             yield start - halo, self._condition(self._params, self._summary, cut)

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.engine import WINDOW, Engine, Rows
+from a2g_jax.geometry.footholds import lock_feet
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
@@ -126,8 +127,9 @@ def plant_rows(run: Run, rows: Rows) -> Motion:
 
 
 def plant_rotations(run: Run, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion:
-    """The motion of local rotations, with a root that plants the feet as in the run's mean pose."""
+    """The motion of local rotations, with a root that plants the feet as in the run's mean pose, and legs that keep
+    standing feet where they are."""
     config = run.config
     still = Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps)
     mean_pose = config.space.mean_rotations(config.statistics["pose"].mean)
-    return plant_feet(still, np.asarray(config.statistics["root"].mean), mean_pose)
+    return lock_feet(plant_feet(still, np.asarray(config.statistics["root"].mean), mean_pose))

@@ -21,7 +21,8 @@ from a2g_jax.geometry.retarget.poses import world_rotations
 from a2g_jax.geometry.retarget.rig import Rig, find_rig
 from a2g_jax.geometry.skeleton import Skeleton
 
-_FLIP = np.diag([-1.0, 1.0, 1.0])
+#: The mirror in a body frame, K.
+FLIP = np.diag([-1.0, 1.0, 1.0])
 
 
 def mirror(motion: Motion, rig: Rig | None = None, *, keep_skeleton: bool = True) -> Motion:
@@ -45,7 +46,7 @@ def mirror(motion: Motion, rig: Rig | None = None, *, keep_skeleton: bool = True
     across = rig.world[:, 0]
     reflect = np.eye(3) - 2 * np.outer(across, across)
     parents, align = rig.skeleton.parents, rig.align
-    onto = (align[partner] @ _FLIP @ np.swapaxes(align, -1, -2)).astype(np.float32)
+    onto = (align[partner] @ FLIP @ np.swapaxes(align, -1, -2)).astype(np.float32)
     world = world_rotations(np.asarray(motion.rotations, np.float32), parents)
     world = reflect.astype(np.float32) @ (world[:, partner] @ onto)
     rotations = world.copy()
@@ -103,7 +104,7 @@ def _opposite(rig: Rig, offsets: Float[np.ndarray, "J 3"], joint: int, partner: 
     parents = rig.skeleton.parents
     above = parents[joint]
     other = partner[above]
-    image = rig.align[other] @ _FLIP @ rig.align[above].T @ offsets[joint]
+    image = rig.align[other] @ FLIP @ rig.align[above].T @ offsets[joint]
     taken = {near for near in partner if near >= 0}
     children = [child for child, parent in enumerate(parents) if parent == other and child not in taken]
     return min(children, key=lambda child: float(np.linalg.norm(offsets[child] - image)), default=-1)
@@ -114,10 +115,10 @@ def _mirrored_skeleton(skeleton: Skeleton, rig: Rig, partner: list[int]) -> Skel
     result = offsets.copy()
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            result[joint] = align[parent] @ _FLIP @ align[partner[parent]].T @ offsets[partner[joint]]
+            result[joint] = align[parent] @ FLIP @ align[partner[parent]].T @ offsets[partner[joint]]
     ends = []
     for owner, end in skeleton.ends:
         joint = partner[owner]
-        x, y, z = (align[joint] @ _FLIP @ align[owner].T @ np.asarray(end)).tolist()
+        x, y, z = (align[joint] @ FLIP @ align[owner].T @ np.asarray(end)).tolist()
         ends.append((joint, (x, y, z)))
     return replace(skeleton, offsets=result.astype(np.float32), ends=tuple(sorted(ends)))

@@ -18,11 +18,29 @@ from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_kinds import WIDTHS as WIDTHS
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.rotation import axis_angle_from_matrix, matrix_from_6d, matrix_from_axis_angle, matrix_to_6d
+from a2g_jax.geometry.rotation import (
+    axis_angle_from_matrix,
+    matrix_from_6d,
+    matrix_from_axis_angle,
+    matrix_from_yxz,
+    matrix_to_6d,
+    yxz_from_matrix,
+)
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 
 #: Names of the rows of a pose, for messages.
-_NOUNS = {"6d": "joints", "exponential": "joints", "directions": "bone directions", "keypoints": "keypoints"}
+_NOUNS = {
+    "6d": "joints",
+    "exponential": "joints",
+    "euler": "joints",
+    "directions": "bone directions",
+    "keypoints": "keypoints",
+}
+
+
+#: Between local rotation matrices and the kinds of poses that are rotations.
+_TO_MATRIX = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle, "euler": matrix_from_yxz}
+_FROM_MATRIX = {"6d": matrix_to_6d, "exponential": axis_angle_from_matrix, "euler": yxz_from_matrix}
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +84,7 @@ class PoseSpace:
     @property
     def has_rotations(self) -> bool:
         """Whether poses are rotations of a skeleton's joints."""
-        return self.kind in ("6d", "exponential")
+        return self.kind in _FROM_MATRIX
 
     @property
     def unit_scale(self) -> bool:
@@ -81,7 +99,9 @@ class PoseSpace:
             InputError: poses are keypoints or directions.
         """
         if not isinstance(self.body, Skeleton):
-            raise InputError(f"poses are {self.noun}, which have no skeleton; this needs --pose 6d or exponential.")
+            raise InputError(
+                f"poses are {self.noun}, which have no skeleton; this needs --pose 6d, exponential or euler."
+            )
         return self.body
 
     def same_as(self, other: "PoseSpace") -> bool:
@@ -96,7 +116,7 @@ class PoseSpace:
         """Local rotation matrices; None where poses are no rotations."""
         if not self.has_rotations:
             return None
-        return matrix_from_6d(pose) if self.kind == "6d" else matrix_from_axis_angle(pose)
+        return _TO_MATRIX[self.kind](pose)
 
     def from_rotations(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R D"]:
         """Poses of local rotation matrices.
@@ -106,7 +126,7 @@ class PoseSpace:
         """
         if not self.has_rotations:
             raise InputError(f"poses are {self.noun}; rotations cannot be written as these.")
-        return matrix_to_6d(rotations) if self.kind == "6d" else axis_angle_from_matrix(rotations)
+        return _FROM_MATRIX[self.kind](rotations)
 
     def joint_positions(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R 3"]:
         """Joint positions of local rotations in metres, the root at the origin."""
@@ -249,7 +269,7 @@ def unit_vectors(values: Float[np.ndarray, "T R D"], kind: str, fallback: Float[
 
 def interchangeable(kind: str) -> tuple[str, ...]:
     """The kinds that a recording of one kind can be written in without loss; the kind itself first."""
-    return ("6d", "exponential") if kind == "6d" else (kind,)
+    return tuple(_FROM_MATRIX) if kind == "6d" else (kind,)
 
 
 def write_motion(motion: Motion, kind: str, where: str) -> tuple[Float[np.ndarray, "T R D"], Skeleton | PoseLayout]:
@@ -267,18 +287,26 @@ def write_motion(motion: Motion, kind: str, where: str) -> tuple[Float[np.ndarra
     rotations = np.asarray(motion.rotations, np.float32)
     if kind == "6d":
         return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6), motion.skeleton
-    if kind == "exponential":
-        return np.asarray(_exponential(rotations)), motion.skeleton
-    raise InputError(f"{where}: holds rotations of joints; prepare it with --pose 6d, exponential or directions.")
+    if kind in _FROM_MATRIX:
+        return np.asarray(_written(rotations, kind)), motion.skeleton
+    raise InputError(
+        f"{where}: holds rotations of joints; prepare it with --pose {', '.join(_FROM_MATRIX)} or directions."
+    )
 
 
 def rotations_from_rows(values: Float[np.ndarray, "T J D"], kind: str) -> Float[np.ndarray, "T J 3 3"]:
     """Rotation matrices of poses that are rotations."""
-    return np.asarray(matrix_from_6d(values) if kind == "6d" else _matrices(values))
+    return np.asarray(matrix_from_6d(values) if kind == "6d" else _matrices(values, kind))
 
 
-_exponential = jax.jit(axis_angle_from_matrix)
-_matrices = jax.jit(matrix_from_axis_angle)
+@partial(jax.jit, static_argnums=1)
+def _written(rotations, kind):
+    return _FROM_MATRIX[kind](rotations)
+
+
+@partial(jax.jit, static_argnums=1)
+def _matrices(values, kind):
+    return _TO_MATRIX[kind](values)
 
 
 def _directions(motion: Motion) -> tuple[Float[np.ndarray, "T B 3"], PoseLayout]:

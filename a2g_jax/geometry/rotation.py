@@ -170,3 +170,25 @@ def slerp(start: Float[Array, " 4"], end: Float[Array, " 4"], weight: Float[Arra
     high = jnp.where(near, weight, jnp.sin(weight * safe) / jnp.sin(safe))
     mixed = low * start + high * end
     return mixed / jnp.sqrt(jnp.dot(mixed, mixed))
+
+
+def matrix_from_yxz(angles: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3 3"]:
+    """``Ry(a) Rx(b) Rz(c)`` of angles a, b, c in radians.
+
+    On a skeleton whose T-pose lies along x and has no rotations, these are an elbow's flexion and the forearm's twist,
+    and a third angle that no elbow has: the rotations of a joint with two degrees of freedom are a plane.
+    """
+    (ca, cb, cc), (sa, sb, sc) = (jnp.moveaxis(f(angles), -1, 0) for f in (jnp.cos, jnp.sin))
+    rows = (
+        (ca * cc + sa * sb * sc, sa * sb * cc - ca * sc, sa * cb),
+        (cb * sc, cb * cc, -sb),
+        (ca * sb * sc - sa * cc, sa * sc + ca * sb * cc, ca * cb),
+    )
+    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def yxz_from_matrix(matrix: Float[Array, "*batch 3 3"]) -> Float[Array, "*batch 3"]:
+    """Inverse of :func:`matrix_from_yxz`: b within a quarter turn, a and c within half a turn."""
+    first = jnp.arctan2(matrix[..., 0, 2], matrix[..., 2, 2])
+    middle = jnp.arctan2(-matrix[..., 1, 2], jnp.hypot(matrix[..., 1, 0], matrix[..., 1, 1]))
+    return jnp.stack([first, middle, jnp.arctan2(matrix[..., 1, 0], matrix[..., 1, 1])], axis=-1)

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.likelihood import compiled_log_likelihood
+from a2g_jax.evaluation.likelihood import compiled_log_likelihood, density_of
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.clips import read_on_skeleton
 from a2g_jax.geometry.motion import Motion
@@ -49,7 +49,7 @@ class MotionLikelihood:
     moments: tuple[Moment, ...]
     """The least likely first."""
     dimensions: int
-    """Number of values of a pose."""
+    """Number of values of a pose that have a density."""
     fps: float
     turned: float = 0.0
     """Degrees about the vertical by which the motion was turned to the heading of the run."""
@@ -80,6 +80,7 @@ def motion_likelihood(run: Run, motion: Motion, audio: Float[np.ndarray, " N"]) 
     """
     config = run.config
     density, model = compiled_log_likelihood(run), config.build()
+    dimensions, stride = density_of(config).dimensions, density_of(config).stride
     seconds = len(audio) / config.mel.sample_rate
     if motion.seconds > seconds + max(_SPARE, 1.0 / config.fps):
         raise InputError(
@@ -101,13 +102,14 @@ def motion_likelihood(run: Run, motion: Motion, audio: Float[np.ndarray, " N"]) 
     pose = np.pad(pose, ((0, len(rows) - len(pose)), (0, 0), (0, 0)), mode="edge")
     parts, done = [], 0
     while done < count:
-        start = max(0, done - run_in)
+        # The poses of a density lie at multiples of its stride, whatever the window.
+        start = max(0, done - run_in) // stride * stride
         nats = np.asarray(density(rows[None, start : start + length], pose[None, start : start + length]))[0]
         parts.append(nats[done - start :])
         done += len(parts[-1])
     log_likelihood = np.concatenate(parts)[:count].astype(np.float64)
     moments = tuple(unlikely_moments(log_likelihood, before, faced))
-    return MotionLikelihood(before, log_likelihood, moments, int(pose[0].size), config.fps, turned)
+    return MotionLikelihood(before, log_likelihood, moments, dimensions, config.fps, turned)
 
 
 def _facing(run: Run, motion: Motion) -> tuple[float, Motion]:

@@ -63,7 +63,9 @@ class Condition(NamedTuple):
     seed_poses: Float[Array, "S R D"] | None = None
     """Poses before the first frame of the motion, not normalised; of the whole motion, not of a window."""
     controls: Float[Array, "T K"] | None = None
-    """Requested value of each of :attr:`Model.controls`, in percentiles of the training clips."""
+    """Requested value of each of :attr:`Model.controls`, in percentiles of the training clips; NaN for a free one."""
+    style: Float[Array, " S"] | None = None
+    """Of models with :attr:`Model.style_code`: the style code of a clip."""
     latents: Latents | None = None
     """Of models with :attr:`Model.encode`: latents in place of drawn ones."""
 
@@ -115,6 +117,10 @@ class Density(NamedTuple):
     lookahead: int
     noise: float
     """Standard deviation of the noise on training poses, z-scores; 0 for none."""
+    dimensions: int
+    """Values of a pose that have a density; the model generates the others as constants."""
+    stride: int = 1
+    """Frames between the poses that have a density; N is the number of these in ``conditioning``."""
 
 
 class Classifier(NamedTuple):
@@ -172,20 +178,26 @@ class Model(NamedTuple):
     proceed: Callable[..., tuple[Array, Any]] | None = None
     """``proceed(params, summary, key, condition, start, state) -> (pose (T, R, D), state)``: the next T frames.
 
-    Every array of such a model's condition has time as its leading axis. ``sample`` is ``proceed`` after ``begin``.
+    Every array of such a model's condition has time as its leading axis, ``T + overlap`` frames. ``sample`` is
+    ``proceed`` after ``begin``.
     """
     seed_frames: int = 0
     """Poses S that ``begin`` takes."""
     lookahead: int = 0
     """Frames of audio after its own that a frame of an autoregressive model depends on."""
+    overlap: int = 0
+    """Frames after the T that ``proceed`` returns of which it also needs the condition."""
     controls: Controls | None = None
 
     reconstruct: Callable[..., Array] | None = None
     """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""
     encode: Callable[..., Array] | None = None
-    """``encode(params, audio (T, bands), pose (T, R, D), controls (T, K)) -> (N, C)``: latents of the frames of a clip
-    that have ``seed_frames`` before them and ``lookahead`` after them, which :attr:`Condition.latents` can replay."""
+    """``encode(params, audio (T, bands), pose (T, R, D), controls (T, K), style (S,) | None) -> (N, C)``: latents of
+    the frames of a clip that have ``seed_frames`` before them and ``lookahead`` after them, which
+    :attr:`Condition.latents` can replay."""
     features: Callable[..., list[Array]] | None = None
     """``features(params, pose (B, T, R, D)) -> blocks (B, T, width)``: for perceptual losses and distances."""
+    style_code: Callable[..., Array] | None = None
+    """``style_code(params, pose (T, R, D)) -> (S,)``: what the model keeps of a clip as its style."""
     density: Density | None = None
     classifier: Classifier | None = None

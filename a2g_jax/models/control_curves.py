@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from a2g_jax.errors import InputError
 
-#: Percentile of a control that is not requested: the median of the training clips.
+#: Percentile of a control that is not requested, in models that always have one: the median of the training clips.
 DEFAULT = 50.0
 
 
@@ -42,7 +42,7 @@ def parse_curve(text: str) -> Curve:
 
 
 def parse_curves(texts: Sequence[str], names: Sequence[str]) -> tuple[Curve, ...]:
-    """One curve for each of ``names``, in their order.
+    """One curve for each of ``names``, in their order; of NaN for one that is not requested.
 
     Raises:
         InputError: an invalid line, an unknown control, or a control requested twice.
@@ -55,7 +55,7 @@ def parse_curves(texts: Sequence[str], names: Sequence[str]) -> tuple[Curve, ...
         if curve.name in curves:
             raise _refused(text, f"{curve.name} is requested twice; give its changes as 'VALUE@SECOND VALUE@SECOND'")
         curves[curve.name] = curve
-    return tuple(curves.get(name, Curve(name, (0.0,), (DEFAULT,))) for name in names)
+    return tuple(curves.get(name, Curve(name, (0.0,), (math.nan,))) for name in names)
 
 
 def _number(text: str, line: str) -> float:

@@ -26,6 +26,8 @@ class TrainConfig:
     """Entries of gradients beyond this are cut to it, before ``clip_norm``; 0 for no clipping."""
     augmentation: float = 0.0
     """Strength of the random gain, equaliser and noise on audio features; 0 for none, 1 for strong."""
+    mirror: float = 0.0
+    """Share of the clips of a step whose left and right are exchanged; needs poses of rotations."""
     seed: int = 0
     """Seed of initial weights, batches and all random draws of training."""
     checkpoint_every: int = 1_000
@@ -59,6 +61,8 @@ class TrainConfig:
         for name in ("warmup_steps", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
+        if not 0 <= self.mirror <= 1:
+            raise InputError(f"--mirror: expected a share from 0 to 1; got {self.mirror}.")
         if not 0 < self.learning_rate < float("inf"):
             raise InputError(f"--learning-rate: expected a number above 0; got {self.learning_rate}.")
         if self.schedule not in ("constant", "cosine", "noam"):

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from flax import linen as nn
 from jax import lax
+from jax.nn.initializers import Initializer
 from jaxtyping import Array, Float
 
 _DIMENSIONS = ("NWC", "WIO", "NWC")
@@ -60,18 +61,19 @@ conv1d.defvjp(_conv_forward, _conv_backward)
 
 
 class Conv1D(nn.Module):
-    """:func:`conv1d` with a bias; weights initialised as Xavier's (Glorot's) uniform, the bias to zero."""
+    """:func:`conv1d` with a bias; weights initialised as Xavier's (Glorot's) uniform unless given, the bias to zero."""
 
     features: int
     kernel_size: int = 3
     dilation: int = 1
+    kernel_init: Initializer = nn.initializers.xavier_uniform()
 
     @nn.compact
     def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B T D"]:
         if self.kernel_size % 2 == 0:
             raise ValueError(f"Expected an odd kernel size, for symmetric padding; got {self.kernel_size}.")
         shape = (self.kernel_size, x.shape[-1], self.features)
-        kernel = self.param("kernel", nn.initializers.xavier_uniform(), shape)
+        kernel = self.param("kernel", self.kernel_init, shape)
         bias = self.param("bias", nn.initializers.zeros_init(), (self.features,))
         return conv1d(x, kernel, self.dilation) + bias[None, None]
 

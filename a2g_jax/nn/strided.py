@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from flax import linen as nn
 from jax import lax
+from jax.nn.initializers import Initializer
 from jaxtyping import Array, Float
 
 
@@ -58,16 +59,17 @@ def repeat_frames(x: Float[Array, "B T C"], times: int) -> Float[Array, "B _ C"]
 
 
 class StridedConv1D(nn.Module):
-    """:func:`strided_conv1d` with a bias; Xavier's uniform weights, zero bias."""
+    """:func:`strided_conv1d` with a bias; Xavier's uniform weights unless given, zero bias."""
 
     features: int
     kernel_size: int = 4
     stride: int = 2
+    kernel_init: Initializer = nn.initializers.xavier_uniform()
 
     @nn.compact
     def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B _ D"]:
         shape = (self.kernel_size, x.shape[-1], self.features)
-        kernel = self.param("kernel", nn.initializers.xavier_uniform(), shape)
+        kernel = self.param("kernel", self.kernel_init, shape)
         bias = self.param("bias", nn.initializers.zeros_init(), (self.features,))
         return strided_conv1d(x, kernel, self.stride) + bias[None, None]
 

@@ -14,10 +14,11 @@ import jax
 import numpy as np
 
 from a2g_jax.data.batch import ClipShape, clip_shape, gather, gather_clips, gather_from_disk
-from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_starts, find_crops
+from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_others, draw_starts, find_crops
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
+from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
@@ -66,6 +67,8 @@ def train(
     shape = clip_shape(model.batch_fields, model.clip_frames, corpus.fps, corpus.mel.sample_rate)
     for name in shape.arrays:
         corpus.array(name)
+    if settings.mirror > 0:
+        pose_mirror(config.space)
     spans = stage_spans(model, settings)
     total = spans[-1].stop
     state = init_state(model, spans, settings.seed)
@@ -180,18 +183,22 @@ class _Steps:
 def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunConfig) -> Callable[[Part], _Step]:
     """A function from parts to whole steps: choose clips, augment, compute, update; the same for data on disk."""
     settings = config.train_config
-    make_batch = BatchMaker(config.statistics["audio"], settings.augmentation)
+    mirror_pose = pose_mirror(config.space) if settings.mirror > 0 else None
+    make_batch = BatchMaker(config.statistics["audio"], settings.augmentation, settings.mirror, mirror_pose)
 
     def finish(state: TrainState, clips: dict[str, Any]) -> tuple[TrainState, Metrics]:
         _, augment_key, model_key = step_keys(state.key, state.step)
         return advance(span, state, make_batch(augment_key, clips), model_key)
 
     def starts(state: TrainState):
-        return draw_starts(step_keys(state.key, state.step)[0], crops, settings.batch_size)
+        key = step_keys(state.key, state.step)[0]
+        chosen = draw_starts(key, crops, settings.batch_size)
+        return chosen, draw_others(jax.random.fold_in(key, 0), crops, chosen) if shape.paired else None
 
     @partial(jax.jit, donate_argnums=0)
     def on_device(state: TrainState, arrays: dict[str, Any]):
-        return finish(state, gather_clips(arrays, shape, starts(state), gather))
+        chosen, others = starts(state)
+        return finish(state, gather_clips(arrays, shape, chosen, gather, others))
 
     choose = jax.jit(starts)
     compute = jax.jit(finish, donate_argnums=0)
@@ -204,7 +211,8 @@ def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunCo
             return lambda state: on_device(state, arrays)
 
         def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
-            clips = gather_clips(part.arrays, shape, np.asarray(choose(state)), gather_from_disk)
+            chosen, others = jax.tree.map(np.asarray, choose(state))
+            clips = gather_clips(part.arrays, shape, chosen, gather_from_disk, others)
             return compute(state, clips)
 
         return from_disk

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from a2g_jax.data.batch import Batch, clip_shape, gather_clips, gather_from_disk
-from a2g_jax.data.batches import BatchMaker, tiled_starts
+from a2g_jax.data.batches import BatchMaker, opposite_starts, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Model, Params, Stage, Summary
@@ -33,7 +33,9 @@ def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: 
     shape = clip_shape(model.batch_fields, frames, corpus.fps, corpus.mel.sample_rate)
     arrays = {name: corpus.array(name) for name in shape.arrays}
     for first in range(0, len(starts), _BATCH):
-        clips = gather_clips(arrays, shape, starts[first : first + _BATCH], gather_from_disk)
+        rows = starts[first : first + _BATCH]
+        others = opposite_starts(corpus, split, frames, rows) if shape.paired else None
+        clips = gather_clips(arrays, shape, rows, gather_from_disk, others)
         yield make(None, {name: jnp.asarray(clip) for name, clip in clips.items()})
 
 

@@ -27,6 +27,7 @@ STYLEGESTURES = "StyleGestures (MoGlow)"
 _STYLEGESTURES = Variant(
     {**MOGLOW, "predictor": False, "history_frames": 5, "lookahead_frames": 20, "clip_frames": 120},
     model="stylized_flow",
+    preset="tiny_published",
     training=TRAINING,
 )
 

@@ -3,13 +3,15 @@
     python -m experiments.stylized_flow.style RUN --corpus CORPUS [--pairs 12] [--samples 3]
 
 Motion is generated for speech of one speaker of the generated corpus, plainly and with the latents of a clip of another
-speaker, both newly generated. Measured: the way of mean height, speed and radius of the hands from plain motion to the
-clip's (a projection, in units of the spread over speakers); the probability of the clip's speaker by a classifier
-trained on the corpus's own motion; and agreement of the wrists' speed with the speech, also of shifted motion.
+speaker, both newly generated; runs trained for it also take the clip's style code and controls. Measured: the way of
+mean height, speed and radius of the hands from plain motion to the clip's (a projection, in units of the spread over
+speakers); the probability of the clip's speaker by a classifier trained on the corpus's own motion; and agreement of
+the wrists' speed with the speech, also of shifted motion.
 Writes ``results/style.json``.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,6 @@ from sklearn.preprocessing import StandardScaler
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
-from a2g_jax.generation.stylized_flow.style import Style
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
@@ -103,12 +104,12 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
             theirs = names[(number + 2) % 6]
         speech = talk(SECONDS, seed + 300_000 + 2 * number, speaker=ours, fps=fps)
         clip = talk(SECONDS, seed + 300_001 + 2 * number, speaker=theirs, fps=fps)
-        latents = space.encode(clip.motion, clip.audio)
+        whole = space.style(clip.motion, clip.audio)
         plain = space.generate(speech.audio, samples, seed=number)
         source, target = mean_style(plain), hand_style(clip.motion.positions(), fps)
         conditions = {"plain": plain, "the clip itself": [clip.motion]}
         for mode, share, seeded in SETTINGS:
-            style = Style(latents, mode=mode, share=share)
+            style = replace(whole, mode=mode, share=share)
             # A clip repeated with share 1 is deterministic.
             count = 1 if (mode, share) == ("repeat", 1.0) else samples
             before = clip.motion if seeded else None

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from a2g_jax.data.batch import FIELDS, Batch, clip_shape, gather, gather_clips, gather_from_disk
-from a2g_jax.data.batches import BatchMaker, draw_starts, find_crops, tiled_starts
+from a2g_jax.data.batches import BatchMaker, draw_others, draw_starts, find_crops, opposite_starts, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.data.splits import Segment
@@ -96,8 +96,43 @@ def test_tiles_cover_without_overlap():
     assert tiled_starts(corpus(train=TRAIN), "train", 100).tolist() == []
 
 
+def recording_of(rows):
+    return np.searchsorted([0, 12, 17, 47], rows, side="right")
+
+
+def test_second_clips_are_of_the_same_recording_and_anywhere_in_it():
+    crops = find_crops(corpus(train=TRAIN), "train", 6)
+    starts = draw(jax.random.key(0), crops, 4200)
+    others = np.asarray(jax.jit(lambda key, starts: draw_others(key, crops, starts))(jax.random.key(1), starts))
+    np.testing.assert_array_equal(recording_of(others), recording_of(np.asarray(starts)))
+    assert set(others.tolist()) == set(VALID)
+    longest = others[recording_of(others) == 3]
+    assert stats.chisquare(np.unique(longest, return_counts=True)[1]).pvalue > 0.01
+
+
+def test_opposite_clips_are_half_a_recording_away():
+    data = corpus(train=TRAIN)
+    starts = tiled_starts(data, "train", 6)
+    others = opposite_starts(data, "train", 6, starts)
+    assert set(others.tolist()) <= set(VALID)
+    np.testing.assert_array_equal(recording_of(others), recording_of(starts))
+    # Recording 2 has 10 starts from row 27 on, recording 0 has 7 from row 0 on.
+    assert others[starts == 27] == 32
+    assert others[starts == 6] == 2
+
+
+def test_other_poses_are_those_of_the_second_clips():
+    arrays = {"audio": np.zeros((20, 2)), "pose": np.arange(20.0).reshape(20, 1, 1)}
+    shape = clip_shape(("other_pose",), 4, 30.0, 16000)
+    assert shape.paired
+    assert shape.arrays == ("audio", "pose")
+    clips = gather_clips(arrays, shape, np.array([0, 9]), gather_from_disk, np.array([5, 16]))
+    np.testing.assert_array_equal(clips["other_pose"][:, 0, 0, 0], [5, 16])
+    assert not clip_shape(("audio",), 4, 30.0, 16000).paired
+
+
 def test_every_field_of_a_batch_has_its_arrays():
-    assert set(FIELDS) == set(Batch._fields)
+    assert {*FIELDS, "mirrored"} == set(Batch._fields)
 
 
 @pytest.mark.parametrize("take", [gather, gather_from_disk])
@@ -150,3 +185,15 @@ class TestBatchMaker:
         assert np.abs(result[0] - result[1]).max() > 0.01
         assert np.abs(result[1] - result[2]).max() > 0.01
         np.testing.assert_array_equal(result, make(jax.random.key(0), same).audio)
+
+    def test_a_share_of_clips_is_mirrored_with_their_second_clips(self):
+        make = jax.jit(BatchMaker(self.statistics, 0.0, 0.25, lambda pose: -pose))
+        pose = np.ones((2000, 2, 1, 1), np.float32)
+        clips = {"audio": np.zeros((2000, 2, 8), np.float32), "pose": pose, "other_pose": 2 * pose}
+        batch = make(jax.random.key(0), clips)
+        assert abs(float(batch.mirrored.mean()) - 0.25) < 0.03
+        np.testing.assert_array_equal(batch.pose[:, 0, 0, 0], np.where(batch.mirrored, -1.0, 1.0))
+        np.testing.assert_array_equal(batch.other_pose, 2 * batch.pose)
+        plain = make(None, clips)
+        assert not plain.mirrored.any()
+        np.testing.assert_array_equal(plain.pose, pose)

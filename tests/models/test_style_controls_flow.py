@@ -17,10 +17,11 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.models.control_curves import parse_curves
+from a2g_jax.models.stylized_flow.autoregression import proceed, start
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, requested, scaled
 from a2g_jax.models.stylized_flow.model import build
-from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.stylized_flow.networks import Extras, FlowNetworks
 from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans
@@ -101,14 +102,14 @@ def test_controls_are_those_of_the_frame_itself_and_never_masked():
     batch = batch_of(clips=2)
     mask = jnp.zeros((2, 17, 2), bool)
     conditioning = jax.jit(networks.conditioning)
-    own = conditioning({}, batch.audio, networks.flat(batch.pose), mask)
+    own = conditioning({}, batch.audio, networks.flat(batch.pose), mask, networks.scored(batch.pose))
     controls = jax.jit(lambda pose: scaled(("height", "speed"), measure(("height", "speed"), DATA, pose)))(batch.pose)
     assert own.context.shape == (2, 17, 4 * 4 + 2)
     np.testing.assert_allclose(own.context[..., -2:], controls[:, 2:19], atol=1e-4)
     assert not own.history.any()
     # Requested ones replace them, frame by frame; 0.1 m is scaled to 1.
     rising = jnp.broadcast_to(jnp.arange(20.0)[None, :, None], (2, 20, 2))
-    given = conditioning({}, batch.audio, networks.flat(batch.pose), mask, rising)
+    given = conditioning({}, batch.audio, networks.flat(batch.pose), mask, Extras(rising))
     np.testing.assert_allclose(given.context[..., -2:], 10.0 * rising[:, 2:19], rtol=1e-6)
 
 
@@ -121,14 +122,14 @@ def test_the_share_of_controls_is_that_of_training(trained):
 
     @jax.jit
     def one_by_one(params):
-        given = networks.audio_context(params, batch.audio[0], controls)
-        return networks.proceed(params, z[:, None], given, networks.start(params, 1))[0][:, 0]
+        given = networks.audio_context(params, batch.audio[0], Extras(controls[None]))
+        return proceed(networks, params, z[:, None], given, start(networks, params, 1), jnp.int32(0))[0][0]
 
     @jax.jit
     def at_once(params, before):
         ends = ((0, 0), (CONFIG.history_frames, CONFIG.lookahead_frames), (0, 0))
         clip = [jnp.pad(values, ends) for values in (batch.audio, before[None], controls[None])]
-        return networks.motion(params, z[None], networks.conditioning(params, *clip[:2], None, clip[2]))[0]
+        return networks.motion(params, z[None], networks.conditioning(params, *clip[:2], None, Extras(clip[2])))[0]
 
     made = one_by_one(params)
     np.testing.assert_allclose(at_once(params, made), made, atol=1e-4)

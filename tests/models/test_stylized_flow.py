@@ -17,6 +17,7 @@ from a2g_jax.models.optimiser import learning_rate
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.model import build, draw_latents
 from a2g_jax.models.stylized_flow.networks import FlowNetworks
+from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state, joint_loss
@@ -43,6 +44,8 @@ DATA = Data(
     4,
     Statistics(np.full(SHAPE, 0.5, np.float32), np.full(SHAPE, 2.0, np.float32)),
 )
+#: With the noise of training, so that a motion's latents are those that were drawn.
+AS_DRAWN = StylizedFlowSampling(denoise=False)
 SETTINGS = TrainConfig(steps=200, learning_rate=3e-3, clip_value=5.0, clip_norm=100.0)
 
 
@@ -55,7 +58,7 @@ def batch_of(clips=4, frames=24, seed=0):
 
 
 def trained(config, steps=60):
-    model = build(config, DATA)
+    model = build(config, DATA, AS_DRAWN)
     state = init_state(model, stage_spans(model, SETTINGS), SETTINGS.seed)
     step = jax.jit(lambda state, batch, key: advance(stage_spans(model, SETTINGS)[0], state, batch, key))
     history = []
@@ -102,7 +105,7 @@ def test_a_motion_in_two_parts_is_the_motion_in_one():
 
 
 def test_only_poses_beyond_those_of_training_are_pulled_back():
-    model = build(MOGLOW, DATA)
+    model = build(MOGLOW, DATA, AS_DRAWN)
     params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=128).audio[0]
     given, sample = jax.jit(model.condition)(params, {}, Condition(audio)), jax.jit(model.sample)

@@ -9,12 +9,14 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
+from a2g_jax.generation.controls import percentiles
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
-from a2g_jax.generation.stylized_flow.style import Style, drive
+from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
+from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
@@ -46,13 +48,16 @@ class FlowSpace:
         self.generator = Generator(run, window)
         #: Poses before a frame in its conditioning.
         self.history: int = model.seed_frames
-        #: Values of a frame, and of its latent.
-        self.channels: int = int(np.prod(run.config.space.shape))
+        #: Values of a latent.
+        self.channels: int = model.density.dimensions if model.density else int(np.prod(run.config.space.shape))
         self._lookahead = model.lookahead
         self._params = jax.device_put(run.params)
         self._encode = jax.jit(model.encode)
         measure = model.controls.measure if model.controls else lambda pose: jnp.zeros((*pose.shape[:2], 0))
         self._controls = jax.jit(measure)
+        self._code = None if model.style_code is None else jax.jit(model.style_code)
+        self._clip_frames = model.clip_frames
+        self._names = model.controls.names if model.controls else ()
 
     def encode(
         self, motion: Motion, audio: Float[np.ndarray, " N"] | None = None, name: str = "the clip"
@@ -110,7 +115,40 @@ class FlowSpace:
         # Style controls are averages over seconds: of the clip only, not of the padding around it.
         controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0]
         controls = np.pad(controls, ((self.history, after), (0, 0)), mode="edge")
-        return np.asarray(self._encode(self._params, audio, np.asarray(poses, np.float32), controls))[:frames]
+        code = self._style_code(rows)
+        return np.asarray(self._encode(self._params, audio, np.asarray(poses, np.float32), controls, code))[:frames]
+
+    def _style_code(self, rows: Rows) -> Float[np.ndarray, " S"] | None:
+        """Mean style code of parts of a clip that are as long as those of training; None without such codes."""
+        if self._code is None:
+            return None
+        frames = self._clip_frames
+        padded = np.pad(
+            rows, ((0, max(0, frames - len(rows))), (0, 0), (0, 0)), mode="reflect" if len(rows) > 1 else "edge"
+        )
+        firsts = range(0, len(padded) - frames + 1, max(1, frames // 2))
+        parts = [self._code(self._params, np.asarray(padded[first : first + frames], np.float32)) for first in firsts]
+        return np.asarray(np.mean(parts, axis=0), np.float32)
+
+    def style(
+        self,
+        motion: Motion,
+        audio: Float[np.ndarray, " N"] | None = None,
+        mode: str = "repeat",
+        share: float = 1.0,
+        name: str = "the clip",
+    ) -> Style:
+        """All that the run keeps of a clip's style: its latents, and code and mean controls if the run has these.
+
+        Arguments and errors of :meth:`encode` and :class:`~a2g_jax.generation.stylized_flow.style.Style`.
+        """
+        latents = self.encode(motion, audio, name)
+        moved = on_skeleton(motion, self.run.config.skeleton, self.run.config.fps, name)
+        rows = represent(moved, self.run.config.space.kind, name)[0][: len(latents)]
+        controls = None
+        if self._names:
+            controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0)
+        return Style(latents, mode, share, self._style_code(rows), controls)
 
     def generate(
         self,
@@ -164,8 +202,21 @@ class FlowSpace:
     ) -> Iterator[Rows]:
         """Yield the rows of :meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
         earlier = None if seed_rows is None else self._last(seed_rows)
-        latents = drive(style, len(features), self.channels)
-        yield from self.generator.rows(features, samples, seed, seed_poses=earlier, latents=latents)
+        given = {"seed_poses": earlier, "latents": drive(style, len(features), self.channels)}
+        if style is not None and style.share > 0:
+            given |= {"style": style.code, "controls": self._requested(style, len(features))}
+        yield from self.generator.rows(features, samples, seed, **given)
+
+    def _requested(self, style: Style, frames: int) -> Float[np.ndarray, "T K"] | None:
+        """Percentiles of the controls: those of the sampling settings, elsewhere the style's."""
+        if style.controls is None:
+            return None
+        settings = self.run.config.sampling_settings
+        curves = parse_curves(settings.controls, self._names)
+        requested = percentiles(curves, 0, frames, self.run.config.fps)
+        training = np.asarray(self.run.summary["control_mean"])
+        own = control_percentiles(style, training, settings.style_gain)
+        return np.where(np.isnan(requested), own, requested).astype(np.float32)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
         """The last poses, as many as are in the conditioning of a frame."""

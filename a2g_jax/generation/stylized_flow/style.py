@@ -1,5 +1,7 @@
 """The style of a clip: its latents of a flow, and how they drive other speech (Stylized flow, ECCV 2022, Sec. 4.5).
 
+Runs trained for it also take the clip's style code, and the height, speed and radius of its hands.
+
 The paper replaces the drawn latent of a frame by the clip's. That ends with the clip, and all samples are equal. Here
 latents are ``mean_t + scale_t * drawn_t``, with a share ``w`` of style:
 
@@ -37,6 +39,10 @@ class Style:
     """``repeat`` or ``statistics``."""
     share: float = 1.0
     """Share of the style, from 0 to 1."""
+    code: Float[np.ndarray, " S"] | None = None
+    """The clip's style code, for runs with ``style_channels``; used with every share above 0."""
+    controls: Float[np.ndarray, " K"] | None = None
+    """The clip's mean style controls, metres and m/s, for runs with ``style_controls``."""
 
     def __post_init__(self) -> None:
         """Refuse an unknown mode, a share out of range, and a clip without frames."""
@@ -81,6 +87,25 @@ def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
     return Latents(*parts)
 
 
+def control_percentiles(style: Style, training: Float[np.ndarray, "N K"], gain: float = 1.0) -> Float[np.ndarray, " K"]:
+    """The style's controls as percentiles of the training clips, to be requested.
+
+    Requested values lie ``share * gain`` of the way from the median of the training clips to those of the clip, as far
+    as there are such clips: motion follows a request only in part, and a gain above 1, the inverse of that part, makes
+    up for it.
+
+    Args:
+        training: mean controls of every training clip.
+    """
+    assert style.controls is not None
+    median = np.median(training, axis=0)
+    wanted = median + style.share * gain * (style.controls - median)
+    ranks = np.linspace(0.0, 100.0, len(training))
+    return np.array(
+        [np.interp(value, np.sort(column), ranks) for value, column in zip(wanted, training.T, strict=True)], np.float32
+    )
+
+
 def there_and_back(frames: int, length: int) -> Int[np.ndarray, " frames"]:
     """Frames of a clip of that length, forwards and backwards in turn, without repeating its ends."""
     period = max(2 * (length - 1), 1)
@@ -108,7 +133,8 @@ def blend(first: Style, second: Style, share: float) -> Style:
             " one run."
         )
     if share in (0.0, 1.0):
-        return replace(first, latents=(first, second)[int(share)].latents)
+        whole = (first, second)[int(share)]
+        return replace(first, latents=whole.latents, code=whole.code, controls=whole.controls)
     length = max(len(first.latents), len(second.latents))
     ours, theirs = (style.latents[there_and_back(length, len(style.latents))] for style in (first, second))
     cos, sin = np.cos(0.5 * np.pi * share), np.sin(0.5 * np.pi * share)
@@ -116,7 +142,9 @@ def blend(first: Style, second: Style, share: float) -> Style:
     target, current = np.sqrt((cos * ours.std(axis=0)) ** 2 + (sin * theirs.std(axis=0)) ** 2), mixed.std(axis=0)
     mixed *= np.where(current > 1e-6, target / np.maximum(current, 1e-6), 1.0)
     mean = _interpolate_means(ours.mean(axis=0), theirs.mean(axis=0), share)
-    return replace(first, latents=np.asarray(mean + mixed, np.float32))
+    between = lambda a, b: None if a is None or b is None else (1.0 - share) * a + share * b  # noqa: E731
+    code, controls = between(first.code, second.code), between(first.controls, second.controls)
+    return replace(first, latents=np.asarray(mean + mixed, np.float32), code=code, controls=controls)
 
 
 def _interpolate_means(

@@ -96,7 +96,7 @@ class Styling:
                 f"{clip.flag} {clip.path}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST:g} s or more."
             )
         audio = None if clip.audio is None else read_audio(clip.audio, space.run.config.mel.sample_rate)
-        return Style(space.encode(motion, audio, name=f"{clip.flag} {clip.path}"), self.mode, self.share)
+        return space.style(motion, audio, self.mode, self.share, name=f"{clip.flag} {clip.path}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed
 from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.models.base import Data
+from a2g_jax.models.control_curves import DEFAULT
 
 #: The controls, and the value that networks take as 1 (m, m/s): about the standard deviation over clips of speech.
 SCALES = {"height": 0.1, "left_height": 0.1, "right_height": 0.1, "speed": 0.1, "radius": 0.05}
@@ -33,7 +34,7 @@ def check_controls(names: Sequence[str], data: Data) -> None:
     if not data.space.has_rotations:
         raise InputError(
             f"--style-controls: hands are measured on a skeleton, and the corpus holds {data.space.noun};"
-            " prepare it with --pose 6d or --pose exponential, or leave the controls out."
+            " prepare it with --pose 6d, exponential or euler, or leave the controls out."
         )
     lacking = {"L_Wrist", "R_Wrist"} - set(named_joints(data.space.body.names))
     if lacking:
@@ -79,10 +80,11 @@ def scaled(names: Sequence[str], controls: Float[Array, "*S K"]) -> Float[Array,
 
 
 def requested(percentiles: Float[Array, "T K"], training: Float[Array, "N K"]) -> Float[Array, "T K"]:
-    """Control values of requested percentiles, metres and m/s.
+    """Control values of requested percentiles, metres and m/s; the median of those that are not a number.
 
     Args:
         training: mean controls of every training clip.
     """
+    percentiles = jnp.where(jnp.isnan(percentiles), DEFAULT, percentiles)
     columns = [jnp.percentile(training[:, number], percentiles[:, number]) for number in range(percentiles.shape[1])]
     return jnp.stack(columns, axis=-1)

@@ -17,13 +17,19 @@ class WindowEncoder(nn.Module):
     channels: int
     blocks: int
     features: int
+    strided_norm: bool = False
+    """Whether the strided convolutions have a normalisation and a ReLU too, and all of them Kaiming's weights."""
 
     @nn.compact
     def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B F"]:
-        x = StridedConv1D(self.channels)(x)
+        initial = nn.initializers.he_normal() if self.strided_norm else nn.initializers.xavier_uniform()
+        x = self._after(StridedConv1D(self.channels, kernel_init=initial)(x))
         for _ in range(self.blocks):
-            x = nn.relu(x + nn.LayerNorm()(Conv1D(self.channels)(x)))
-        return StridedConv1D(self.features)(x).mean(axis=1)
+            x = nn.relu(x + nn.LayerNorm()(Conv1D(self.channels, kernel_init=initial)(x)))
+        return self._after(StridedConv1D(self.features, kernel_init=initial)(x)).mean(axis=1)
+
+    def _after(self, x: Float[Array, "B T C"]) -> Float[Array, "B T C"]:
+        return nn.relu(nn.LayerNorm()(x)) if self.strided_norm else x
 
 
 class Fusion(nn.Module):

@@ -1,7 +1,9 @@
 """The likelihood of a motion under the flow, frame by frame.
 
 A frame's density is that of its z-scores given the poses before it and the audio around it; over a clip the
-logarithms add up to that of the whole, since the density of a frame depends on no later one (MoGlow, Eq. 5).
+logarithms add up to that of the whole, since the density of a frame depends on no later one (MoGlow, Eq. 5). Channels
+that hardly move are left out where ``least_std`` says so. With a ``stride``, the density is that of the spline's knots,
+and that of a knot is spread evenly over the frames up to the next one.
 
 Poses have a little normal noise in training (``input_noise``), so the learned density is that of poses *plus noise*:
 the true one convolved with a normal distribution of that width. It is evaluated at the pose itself, with the poses
@@ -12,8 +14,6 @@ held-out motion is a little above the log-likelihood that training reports;
 :func:`a2g_jax.evaluation.likelihood.bits_per_dim` gives both.
 """
 
-from dataclasses import replace
-
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -23,12 +23,12 @@ from a2g_jax.nn.flow.priors import log_prob
 
 
 def log_likelihood(
-    networks: FlowNetworks, params: Params, flat: Float[Array, "B T C"], given: Conditioning
+    networks: FlowNetworks, params: Params, flat: Float[Array, "B M C"], given: Conditioning
 ) -> tuple[Float[Array, "B N"], Float[Array, "B N C"]]:
     """Log-density of each frame in nats, and the latents.
 
     Args:
-        flat: z-scores of whole clips; the frames with history and lookahead are evaluated.
+        flat: the flow's poses of whole clips; those with history and lookahead are evaluated.
         given: conditioning of those frames.
     """
     z, log_det = networks.latents(params, networks.inner(flat), given)
@@ -47,21 +47,29 @@ def make_density(networks: FlowNetworks) -> Density:
     ) -> Float[Array, "B N"]:
         """Log-density in nats of the frames with history and lookahead; hidden states are zero before them."""
         flat = networks.flat(pose)
-        controls = None if clean is None else networks.controls(clean)
-        given = networks.conditioning(params, audio, flat, controls=controls)
-        return log_likelihood(networks, params, flat, given)[0]
+        extras = networks.scored(pose if clean is None else clean)
+        given = networks.conditioning(params, audio, flat, extras=extras)
+        by_pose = log_likelihood(networks, params, flat, given)[0] / config.stride
+        count = pose.shape[1] - config.before - networks.lookahead
+        return jnp.repeat(by_pose, config.stride, axis=1)[:, :count]
 
-    # The global feature is left out: it is a function of the rest.
-    plain = FlowNetworks(replace(config, global_channels=0, predictor=False), networks.data)
+    # Encoders are left out: they are functions of the rest.
+    plain = networks.without_parameters()
 
     def conditioning(
         audio: Float[Array, "B T bands"], pose: Float[Array, "B T R D"], clean: Float[Array, "B T R D"]
     ) -> tuple[Float[Array, "B N H"], Float[Array, "B N C"]]:
-        """Pose history, audio window and style controls of the evaluated frames, and their z-scores."""
+        """Pose history, audio window and style controls of the evaluated poses, and their z-scores."""
         flat = plain.flat(pose)
-        given = plain.conditioning({}, audio, flat, controls=plain.controls(clean))
+        given = plain.conditioning({}, audio, flat, extras=plain.scored(clean))
         return jnp.concatenate([given.history, given.context], axis=-1), plain.inner(flat)
 
     return Density(
-        frame_log_likelihood, conditioning, config.history_frames, config.lookahead_frames, config.input_noise
+        frame_log_likelihood,
+        conditioning,
+        config.before,
+        networks.lookahead,
+        config.input_noise,
+        networks.channels,
+        config.stride,
     )

@@ -1,29 +1,21 @@
-"""The flow with its conditioning: latents of motions, motions of latents, and motions frame by frame."""
+"""The flow with its conditioning: latents of motions, and motions of latents given the poses before them."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Key
 
-from a2g_jax.models.base import Data, Latents, Params, Summary
+from a2g_jax.models.base import Data, Latents, Params
+from a2g_jax.models.stylized_flow.audio_encoder import AudioEncoder
+from a2g_jax.models.stylized_flow.channels import Channels
 from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, scaled
 from a2g_jax.models.stylized_flow.global_encoder import Fusion, WindowEncoder
 from a2g_jax.nn.flow.coupling import Shape
-from a2g_jax.nn.flow.glow import (
-    Prepared,
-    first_states,
-    fit_glow,
-    glow,
-    glow_inverse,
-    glow_inverse_step,
-    init_glow,
-    prepare,
-    project,
-    project_last,
-)
+from a2g_jax.nn.flow.glow import fit_glow, glow, glow_inverse, init_glow, prepare, project
 from a2g_jax.nn.flow.predictor import (
     as_steps,
     fit_predictor,
@@ -35,132 +27,207 @@ from a2g_jax.nn.flow.predictor import (
 )
 
 
+class Extras(NamedTuple):
+    """Conditioning of clips apart from audio and poses; what is None is hidden."""
+
+    controls: Float[Array, "B T K"] | None = None
+    """Style controls of every frame, metres and m/s."""
+    shown: Bool[Array, "B T K"] | Bool[Array, "B 1 K"] | None = None
+    """Which controls are visible; all of those given if None."""
+    style: Float[Array, "B S"] | None = None
+    """Style codes, of :meth:`FlowNetworks.style`."""
+    styled: Bool[Array, " B"] | None = None
+    """Which style codes are visible; all of those given if None."""
+    mirrored: Bool[Array, " B"] | None = None
+    """Which clips are mirrored; none if None."""
+
+
 class Conditioning(NamedTuple):
-    """Conditioning of N frames of each clip."""
+    """Conditioning of N poses of each clip."""
 
     history: Float[Array, "B N H"]
     """Poses before them, and the global feature."""
     context: Float[Array, "B N D"]
-    """Audio around them, and style controls."""
-    poses: Float[Array, "B N frames C"]
+    """Audio around them, and :class:`Extras`."""
+    poses: Float[Array, "B N history C"]
     """Poses before them without a mask, for the linear first layer."""
 
 
 class AudioContext(NamedTuple):
-    """The part of the conditioning of T frames that does not depend on poses, computed before the scan over frames."""
+    """The part of the conditioning of T frames that does not depend on poses, computed before the scan over poses."""
 
     projected: tuple[Array, ...]
     """Projection of the context for each step of the flow, (T, gates)."""
+    unguided: tuple[Array, ...]
+    """The same without the style code, for guidance; empty without guidance."""
     embedding: Float[Array, "T E"]
     """Embedding of the audio, for the global encoder; E is 0 without one."""
     latents: Latents
     """Mean and scale of the latents: 0 and 1 where they are drawn."""
 
 
-class State(NamedTuple):
-    """State of sampling between frames."""
-
-    history: Float[Array, "B history C"]
-    """Normalised poses, the oldest first."""
-    states: Any
-    """Hidden states of the recurrent layers."""
-
-
-class Limits(NamedTuple):
-    """The range of each channel in training motion, z-scores; generated poses beyond it are pulled back.
-
-    Errors of a frame enter the next one, and over minutes they accumulate in channels that hardly move, such as ankles.
-    """
-
-    low: Float[Array, " C"]
-    high: Float[Array, " C"]
-
-    def kept(self, x: Float[Array, "B C"]) -> Float[Array, "B C"]:
-        """Poses with half of the excess over the range removed: a spring, so that no motion stops within a frame."""
-        return x - 0.5 * (x - jnp.clip(x, self.low[None], self.high[None]))
+#: Nothing but audio and poses.
+PLAIN = Extras()
 
 
 class FlowNetworks:
-    """Pure functions of parameters; poses here are z-scores, flattened to C values."""
+    """Pure functions of parameters; ``flat`` poses are those of :mod:`a2g_jax.models.stylized_flow.channels`."""
 
     def __init__(self, config: StylizedFlowConfig, data: Data) -> None:
         self.config, self.data = config, data
-        rows = data.pose_statistics.mean.shape
-        self.rows, self.channels = rows, rows[0] * rows[1]
+        self.form = Channels(data.pose_statistics, config.stride, config.least_std)
+        self.channels = len(self.form)
+        width = config.audio_frames * data.audio_bands
         self.shape = Shape(
             self.channels,
             config.history_frames * self.channels + config.global_channels,
-            config.audio_frames * data.audio_bands + len(config.style_controls),
+            (2 * config.audio_channels or width) + self._extra_width,
             config.hidden,
             config.layers,
             config.cell,
             config.exact_identity,
         )
-        self._window = WindowEncoder(config.encoder_channels, config.encoder_blocks, config.embedding_channels)
+        sizes = config.encoder_channels, config.encoder_blocks
+        self._window = WindowEncoder(*sizes, config.embedding_channels, config.strided_norm)
         self._fusion = Fusion(config.encoder_channels, config.global_channels)
+        self._audio = AudioEncoder(config.audio_channels)
+        self._style = WindowEncoder(*sizes, config.style_channels, config.strided_norm)
+
+    @property
+    def _extra_width(self) -> int:
+        """Values of :class:`Extras` in the context."""
+        config = self.config
+        controls = (2 if config.control_dropout > 0 else 1) * len(config.style_controls)
+        return int(config.mirror_flag) + (config.style_channels + 1 if config.style_channels else 0) + controls
 
     def init(self, key: Key[Array, ""]) -> Params:
         """Initial parameters, before the actnorms are fitted to data."""
         config, keys = self.config, jax.random.split(key, 4)
         params: Params = {"glow": init_glow(keys[0], self.shape, config.flow_steps)}
+        poses = jnp.zeros((1, config.history_frames, self.channels))
+        audio = jnp.zeros((1, config.audio_frames, self.data.audio_bands))
         if config.predictor:
             params["predictor"] = init_predictor(config.history_frames, self.channels)
         if config.global_channels:
             both = jnp.zeros((1, 1, 2 * config.embedding_channels))
             params["global_encoder"] = {
-                "pose": self._window.init(keys[1], jnp.zeros((1, config.history_frames, self.channels)))["params"],
-                "audio": self._window.init(keys[2], jnp.zeros((1, config.audio_frames, self.data.audio_bands)))[
-                    "params"
-                ],
+                "pose": self._window.init(keys[1], poses)["params"],
+                "audio": self._window.init(keys[2], audio)["params"],
                 "fusion": self._fusion.init(keys[3], both)["params"],
             }
+        more = jax.random.split(jax.random.fold_in(key, 0))
+        if config.audio_channels:
+            params["audio_encoder"] = self._audio.init(more[0], audio)["params"]
+        if config.style_channels:
+            params["style_encoder"] = self._style.init(more[1], poses)["params"]
         return params
 
-    def flat(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T C"]:
-        """Z-scores of poses."""
-        return self.data.pose_statistics.normalise(pose).reshape(*pose.shape[:2], -1)
+    def flat(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B M C"]:
+        """The flow's poses of a motion."""
+        return self.form.flat(pose)
 
-    def pose(self, flat: Float[Array, "B T C"]) -> Float[Array, "B T R D"]:
-        """Poses of z-scores."""
-        poses: Float[Array, "B T R D"] = self.data.pose_statistics.denormalise(
-            flat.reshape(*flat.shape[:2], *self.rows)
-        )
-        return poses
+    def pose(self, flat: Float[Array, "B M C"]) -> Float[Array, "B T R D"]:
+        """The motion of the flow's poses."""
+        return self.form.pose(flat)
 
     def conditioning(
         self,
         params: Params,
         audio: Float[Array, "B T bands"],
-        flat: Float[Array, "B T C"],
+        flat: Float[Array, "B M C"],
         mask: Bool[Array, "B N history"] | None = None,
-        controls: Float[Array, "B T K"] | None = None,
+        extras: Extras = PLAIN,
     ) -> Conditioning:
-        """Conditioning of the frames from ``history_frames`` to ``T - lookahead_frames`` of each clip.
+        """Conditioning of the poses that have ``history_frames`` before them and ``lookahead_frames`` of audio.
 
         Args:
             mask: which conditioning poses stay, (B, N, history); None for all.
-            controls: style controls of each frame, of :meth:`controls`; None for those that ``flat`` itself has.
         """
         config = self.config
-        before = history = pose_history(flat, config.history_frames, config.lookahead_frames)
-        if config.predictor:
-            history = as_steps(params["predictor"], before)
-        if mask is not None:
-            history = history * mask[..., None]
-        stretches = windows(audio, config.audio_frames)
+        before = pose_history(flat, config.history_frames, self.after)
+        history = self.visible(params, before, mask)
+        count = before.shape[1]
         poses = history.reshape(*history.shape[:2], -1)
+        if config.global_channels or not config.audio_channels:
+            stretches = windows(audio, config.audio_frames)[:, :: config.stride][:, :count]
         if config.global_channels:
             embedded = [self.embed(params, "pose", history), self.embed(params, "audio", stretches)]
             poses = jnp.concatenate([poses, self.fuse(params, *embedded)], axis=-1)
-        if controls is None:
-            controls = self.controls(self.pose(flat))
-        flat_audio = stretches.reshape(*stretches.shape[:2], -1)
-        context = [flat_audio, self.inner(scaled(self.config.style_controls, controls))]
-        return Conditioning(poses, jnp.concatenate(context, axis=-1), before)
+        if config.audio_channels:
+            context = self.inner(self.embed_audio(params, audio)[:, :: config.stride])
+        else:
+            context = stretches.reshape(*stretches.shape[:2], -1)
+        return Conditioning(poses, jnp.concatenate([context, self._extra(extras, context)], axis=-1), before)
+
+    def visible(
+        self, params: Params, before: Float[Array, "B N history C"], mask: Bool[Array, "B N history"] | None = None
+    ) -> Float[Array, "B N history C"]:
+        """Conditioning poses as networks take them: those of a mask in training, all of them otherwise.
+
+        Behind a linear first layer, a pose that is hidden with probability p in training and never in generation makes
+        its sum of inputs 1 / (1 - p) times as large there, and errors of the mean pose grow over minutes. So the
+        expectation is kept: ``poses`` are divided by 1 - p where they are visible in training, and the last pose
+        behind ``steps`` is multiplied by it in generation.
+        """
+        config = self.config
+        stay = None if mask is None else mask[..., None]
+        if not config.predictor:
+            return before if stay is None else before * stay
+        share = 1.0 - config.frame_dropout
+        if config.history_input == "poses":
+            return before if stay is None else before * stay / share
+        steps = as_steps(params["predictor"], before)
+        if stay is not None:
+            return steps * stay
+        return jnp.concatenate([steps[..., :-1, :], share * steps[..., -1:, :]], axis=-2)
+
+    def _extra(self, extras: Extras, like: Float[Array, "B N D"]) -> Float[Array, "B N E"]:
+        """Values of the context that are not audio, for the N poses of each clip that are conditioned on them."""
+        config, (clips, count) = self.config, like.shape[:2]
+        parts = [jnp.zeros((clips, count, 0), like.dtype)]
+        over = lambda values: jnp.broadcast_to(values[:, None], (clips, count, values.shape[1]))  # noqa: E731
+        if config.mirror_flag:
+            mirrored = jnp.zeros(clips) if extras.mirrored is None else extras.mirrored.astype(like.dtype)
+            parts.append(over(mirrored[:, None]))
+        if config.style_channels:
+            code = jnp.zeros((clips, config.style_channels)) if extras.style is None else extras.style
+            styled = jnp.full(clips, extras.style is not None) if extras.styled is None else extras.styled
+            seen = styled.astype(like.dtype)[:, None]
+            parts.append(over(jnp.concatenate([code * seen, seen], axis=-1)))
+        if names := config.style_controls:
+            hidden = jnp.zeros((clips, count, len(names)), like.dtype)
+            values, seen = hidden, hidden
+            if extras.controls is not None:
+                values = self._at(scaled(names, extras.controls), count)
+                seen = jnp.ones_like(values)
+                if extras.shown is not None:
+                    seen = jnp.broadcast_to(self._at(extras.shown.astype(like.dtype), count), values.shape)
+            parts += [values * seen, seen] if config.control_dropout > 0 else [values]
+        return jnp.concatenate(parts, axis=-1)
+
+    def _at(self, by_frame: Float[Array, "B T K"], count: int) -> Float[Array, "B N K"]:
+        """Values of whole clips at the N poses; those of N frames, or of a clip, as they are."""
+        if by_frame.shape[1] in (1, count):
+            return by_frame
+        return self.inner(by_frame[:, :: self.config.stride])
 
     def controls(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T K"]:
         """Style controls of every frame of clips, metres and m/s; K is 0 without any."""
         return measure(self.config.style_controls, self.data, pose)
+
+    def scored(self, pose: Float[Array, "B T R D"], mirrored: Bool[Array, " B"] | None = None) -> Extras:
+        """Extras that likelihoods of motions are conditioned on: their own controls, if these are never hidden."""
+        return Extras(self.controls(pose) if self.config.score_controls else None, mirrored=mirrored)
+
+    def style(self, params: Params, flat: Float[Array, "B M C"]) -> Float[Array, "B S"]:
+        """Style codes of clips, -1 to 1."""
+        code: Any = self._style.apply({"params": params["style_encoder"]}, flat)
+        return jnp.tanh(code)
+
+    def embed_audio(self, params: Params, audio: Float[Array, "B T bands"]) -> Float[Array, "B T E"]:
+        """Embeddings of audio, for the couplings."""
+        embedding: Any = self._audio.apply({"params": params["audio_encoder"]}, audio)
+        return embedding
 
     def embed(self, params: Params, name: str, stretches: Float[Array, "B N T C"]) -> Float[Array, "B N E"]:
         """Embedding of each stretch by one of the two networks of the global encoder."""
@@ -175,14 +242,29 @@ class FlowNetworks:
         )
         return feature
 
-    def inner(self, x: Float[Array, "B T C"]) -> Float[Array, "B N C"]:
-        """The frames of a clip that have the whole conditioning around them."""
-        return x[:, self.config.history_frames : x.shape[1] - self.config.lookahead_frames]
+    @property
+    def lookahead(self) -> int:
+        """Frames of audio after its own that a frame of a generated motion depends on."""
+        return self.config.lookahead_frames + self.config.overlap
+
+    @property
+    def after(self) -> int:
+        """Poses at the end of a clip that only their audio is of use."""
+        return -(-self.config.lookahead_frames // self.config.stride)
+
+    def inner(self, x: Float[Array, "B M C"]) -> Float[Array, "B N C"]:
+        """The poses of a clip that have the whole conditioning around them."""
+        return x[:, self.config.history_frames : x.shape[1] - self.after]
+
+    def inner_frames(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B N R D"]:
+        """The frames of those poses."""
+        stop = -(-pose.shape[1] // self.config.stride) - self.after
+        return pose[:, self.config.before : stop * self.config.stride]
 
     def latents(
         self, params: Params, x: Float[Array, "B N C"], given: Conditioning
     ) -> tuple[Float[Array, "B N C"], Float[Array, "B N"]]:
-        """Latents and log-determinants of frames."""
+        """Latents and log-determinants of poses."""
         if not self.config.predictor:
             return glow(params["glow"], self.shape, x, given.history, given.context)
         errors = predictor(params["predictor"], x, given.poses)
@@ -190,104 +272,64 @@ class FlowNetworks:
         return z, log_det + predictor_log_det(params["predictor"])
 
     def motion(self, params: Params, z: Float[Array, "B N C"], given: Conditioning) -> Float[Array, "B N C"]:
-        """Frames of latents, all at once, given the poses before them."""
+        """Poses of latents, all at once, given the poses before them."""
         x = glow_inverse(params["glow"], self.shape, z, given.history, given.context)
         if not self.config.predictor:
             return x
         return predictor_inverse(params["predictor"], x, given.poses, inverse_whitening(params["predictor"]))
 
     def fitted(
-        self,
-        params: Params,
-        audio: Float[Array, "B T bands"],
-        flat: Float[Array, "B T C"],
-        controls: Float[Array, "B T K"] | None = None,
+        self, params: Params, audio: Float[Array, "B T bands"], flat: Float[Array, "B M C"], extras: Extras = PLAIN
     ) -> Params:
         """Parameters with actnorms and the linear first layer fitted to a batch; arguments of :meth:`conditioning`."""
         x = self.inner(flat)
         if self.config.predictor:
-            before = pose_history(flat, self.config.history_frames, self.config.lookahead_frames)
+            before = pose_history(flat, self.config.history_frames, self.after)
             params = {**params, "predictor": fit_predictor(x, before)}
             x = predictor(params["predictor"], x, before)
-        given = self.conditioning(params, audio, flat, None, controls)
+        given = self.conditioning(params, audio, flat, None, extras)
         return {**params, "glow": fit_glow(params["glow"], self.shape, x, given.history, given.context)}
 
     def audio_context(
         self,
         params: Params,
         audio: Float[Array, "T bands"],
-        controls: Float[Array, "T K"] | None = None,
+        extras: Extras = PLAIN,
         latents: Latents | None = None,
+        guided: bool = False,
     ) -> AudioContext:
         """The context of every frame of an audio, padded with zeros.
 
         Args:
-            controls: style controls, metres and m/s; zeros if None.
+            extras: of this one motion, B = 1, with controls of every frame.
             latents: in place of drawn ones; drawn if None.
+            guided: whether the context without the style code is computed too.
         """
         config = self.config
-        padded = jnp.pad(audio, ((config.history_frames, config.lookahead_frames), (0, 0)))[None]
-        stretches = windows(padded, config.audio_frames)
-        context = jnp.pad(stretches.reshape(len(audio), -1), ((0, 0), (0, len(config.style_controls))))
+        padded = jnp.pad(audio, ((config.before, config.lookahead_frames), (0, 0)))[None]
         embedding = jnp.zeros((len(audio), 0))
+        if config.global_channels or not config.audio_channels:
+            stretches = windows(padded, config.audio_frames)
         if config.global_channels:
             embedding = self.embed(params, "audio", stretches)[0]
-        projected = project(prepare(params["glow"]), context)
-        if controls is not None:
-            share = project_last(prepare(params["glow"]), scaled(config.style_controls, controls))
-            projected = tuple(a + b for a, b in zip(projected, share, strict=True))
+        if config.audio_channels:
+            context = self.embed_audio(params, padded)[0, config.before : config.before + len(audio)]
+        else:
+            context = stretches.reshape(len(audio), -1)
+        prepared = prepare(params["glow"])
+
+        def projected(extras: Extras) -> tuple[Array, ...]:
+            whole = jnp.concatenate([context, self._extra(extras, context[None])[0]], axis=-1)
+            return project(prepared, whole)
+
+        unguided = projected(extras._replace(style=None, styled=None)) if guided else ()
         if latents is None:
             zeros = jnp.zeros((len(audio), self.channels))
             latents = Latents(zeros, zeros + 1.0)
-        return AudioContext(projected, embedding, latents)
+        return AudioContext(projected(extras), unguided, embedding, latents)
 
-    @staticmethod
-    def limits(summary: Summary) -> Limits | None:
-        """Limits of training motion; None for a summary without them."""
-        if "pose_low" not in summary:
-            return None
-        return Limits(
-            jnp.min(jnp.asarray(summary["pose_low"]), axis=0), jnp.max(jnp.asarray(summary["pose_high"]), axis=0)
-        )
-
-    def start(self, params: Params, count: int, seed: Float[Array, "history C"] | None = None) -> State:
-        """State before the first frame of ``count`` sequences.
-
-        Args:
-            seed: z-scores of the poses before it; the mean pose if None.
-        """
-        shape = (count, self.config.history_frames, self.channels)
-        history = jnp.zeros(shape) if seed is None else jnp.broadcast_to(seed[None], shape)
-        return State(history, first_states(prepare(params["glow"]), self.shape, count))
-
-    def proceed(
-        self, params: Params, z: Float[Array, "T B C"], given: AudioContext, state: State, limits: Limits | None = None
-    ) -> tuple[Float[Array, "T B C"], State]:
-        """Frames of latents one after another, each conditioned on those before it.
-
-        Args:
-            limits: of :meth:`limits`; None for none. Within them the frames are the latents' own.
-        """
-        prepared: Prepared = prepare(params["glow"])
-        count = z.shape[1]
-        unwhitening = inverse_whitening(params["predictor"]) if self.config.predictor else None
-
-        def frame(state: State, one):
-            latent, projected, embedding = one
-            history, hidden = state
-            shown = as_steps(params["predictor"], history) if self.config.predictor else history
-            poses = shown.reshape(count, -1)
-            if self.config.global_channels:
-                audio = jnp.broadcast_to(embedding[None, None], (count, 1, embedding.shape[0]))
-                feature = self.fuse(params, self.embed(params, "pose", shown[:, None]), audio)
-                poses = jnp.concatenate([poses, feature[:, 0]], axis=-1)
-            context = tuple(jnp.broadcast_to(share[None], (count, share.shape[0])) for share in projected)
-            x, hidden = glow_inverse_step(prepared, self.shape, latent, poses, context, hidden)
-            if unwhitening is not None:
-                x = predictor_inverse(params["predictor"], x, history, unwhitening)
-            if limits is not None:
-                x = limits.kept(x)
-            return State(jnp.concatenate([history[:, 1:], x[:, None]], axis=1), hidden), x
-
-        after, x = jax.lax.scan(frame, state, (z, given.projected, given.embedding))
-        return x, after
+    def without_parameters(self) -> "FlowNetworks":
+        """Networks whose conditioning needs no parameters: pose history, audio window, and controls if these count."""
+        controls = self.config.style_controls if self.config.score_controls else ()
+        plain = replace(self.config, global_channels=0, predictor=False, audio_channels=0, style_channels=0)
+        return FlowNetworks(replace(plain, style_controls=controls, mirror_flag=False), self.data)

@@ -12,13 +12,25 @@ class StylizedFlowSampling:
 
     temperature: float = 1.0
     """Scale of the latents; 1 is the scale of training."""
+    denoise: bool = True
+    """Whether the noise of training is removed from what is generated:
+    :mod:`a2g_jax.models.stylized_flow.autoregression`."""
+    style_guidance: float = 1.0
+    """Weight of a style clip's code, for runs with --style-channels: 1 as in training, more for a stronger style."""
+    style_gain: float = 1.0
+    """Factor on the distance of a style clip's controls from the medians of the training clips, for runs with
+    --style-controls: the inverse of how far motion follows a request."""
     controls: tuple[str, ...] = field(default=(), metadata={"flag": "control", "repeat": True})
     """Requested style controls in percentiles of the training clips, such as 'height=90', or over seconds
-    'height=10@0 90@5'; 50 for those that are not named. For runs with --style-controls; may be repeated."""
+    'height=10@0 90@5'. Those that are not named are free, or 50 in runs trained without --control-dropout. For runs
+    with --style-controls; may be repeated."""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         if not 0 <= self.temperature < float("inf"):
             raise InputError(f"--temperature: expected 0 or more; got {self.temperature}.")
+        for name in ("style_guidance", "style_gain"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
         for text in self.controls:
             parse_curve(text)

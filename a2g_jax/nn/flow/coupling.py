@@ -84,13 +84,6 @@ def project_condition(params: Params, condition: Float[Array, "*S D"]) -> Float[
     return projected + of_channels(first["input_bias"], projected)
 
 
-def project_last_condition(params: Params, last: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
-    """Contribution of the condition's last values, to add to :func:`project_condition` with zeros in their place."""
-    kernel = params["layer_0"]["known_kernel"]
-    projected: Float[Array, "*S gates"] = last @ kernel[kernel.shape[0] - last.shape[-1] :]
-    return projected
-
-
 def start_states(shape: Shape, count: int, dtype: Any = jnp.float32) -> States:
     """Zero states, as at the start of every training clip."""
     zeros = jnp.zeros((count, shape.hidden), dtype)
@@ -128,9 +121,13 @@ def _one_frame(params, shape, kept, history, projected, states):
     return x, tuple(after)
 
 
-def _scale_and_shift(params, shape, output):
+def _scale_and_shift(params, shape, output, guidance=1.0):
     raw = output @ params["out_kernel"]
     raw = raw + of_channels(params["out_bias"], raw)
+    if guidance != 1.0:
+        # The first half of the sequences have the whole condition, the second half lack what is guided.
+        given, lacking = jnp.split(raw, 2)
+        raw = jnp.tile(lacking + guidance * (given - lacking), (2, 1))
     shift, raw_scale = jnp.split(raw, 2, axis=-1)
     scale = jax.nn.sigmoid(raw_scale + _OFFSET) + _EPSILON
     if shape.exact:
@@ -171,14 +168,34 @@ def coupling_inverse_step(
     history: Float[Array, "B H"],
     projected: Float[Array, "B gates"],
     states: States,
+    guidance: float = 1.0,
 ) -> tuple[Float[Array, "B C"], States]:
     """:func:`coupling_inverse` of one frame.
 
     Args:
         projected: from :func:`project_condition`.
         states: after the previous frame.
+        guidance: if not 1, the sequences are two halves that differ in their condition, and shift and raw scale of
+            both are the second half's plus ``guidance`` times the difference of the first half's (classifier-free
+            guidance, Ho and Salimans 2022).
     """
     kept, changed = jnp.split(y, [shape.kept], axis=-1)
     output, after = _one_frame(params, shape, kept, history, projected, states)
-    scale, shift = _scale_and_shift(params, shape, output)
+    scale, shift = _scale_and_shift(params, shape, output, guidance)
     return jnp.concatenate([kept, changed / scale - shift], axis=-1), after
+
+
+def coupling_step(
+    params: Params,
+    shape: Shape,
+    x: Float[Array, "B C"],
+    history: Float[Array, "B H"],
+    projected: Float[Array, "B gates"],
+    states: States,
+    guidance: float = 1.0,
+) -> tuple[Float[Array, "B C"], Float[Array, " B"]]:
+    """:func:`coupling` of one frame, and its log-determinant; arguments of :func:`coupling_inverse_step`."""
+    kept, changed = jnp.split(x, [shape.kept], axis=-1)
+    output, _ = _one_frame(params, shape, kept, history, projected, states)
+    scale, shift = _scale_and_shift(params, shape, output, guidance)
+    return jnp.concatenate([kept, (changed + shift) * scale], axis=-1), jnp.sum(jnp.log(scale), axis=-1)

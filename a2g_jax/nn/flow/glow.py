@@ -13,9 +13,9 @@ from a2g_jax.nn.flow.coupling import (
     coupling,
     coupling_inverse,
     coupling_inverse_step,
+    coupling_step,
     init_coupling,
     project_condition,
-    project_last_condition,
     start_states,
 )
 from a2g_jax.nn.flow.invertible import (
@@ -24,6 +24,7 @@ from a2g_jax.nn.flow.invertible import (
     invertible,
     invertible_inverse,
     invertible_log_det,
+    weight,
 )
 
 #: ``{"actnorm": ..., "invertible": ..., "coupling": ...}``, every array with a leading axis of K steps.
@@ -112,6 +113,8 @@ class Prepared(NamedTuple):
     """Inverse of convolution and actnorm scale as one matrix, transposed."""
     biases: tuple[Array, ...]
     """Biases of the actnorms."""
+    forward: tuple[Array, ...]
+    """Inverses of ``matrices``."""
 
 
 def prepare(params: Params) -> Prepared:
@@ -122,17 +125,13 @@ def prepare(params: Params) -> Prepared:
         tuple(one["coupling"] for one in apart),
         tuple(inverse_weight(one["invertible"]).T * jnp.exp(-one["actnorm"]["log_scale"])[None] for one in apart),
         tuple(one["actnorm"]["bias"] for one in apart),
+        tuple(jnp.exp(one["actnorm"]["log_scale"])[:, None] * weight(one["invertible"]).T for one in apart),
     )
 
 
 def project(prepared: Prepared, condition: Float[Array, "*S D"]) -> tuple[Array, ...]:
     """:func:`a2g_jax.nn.flow.coupling.project_condition` of every step."""
     return tuple(project_condition(one, condition) for one in prepared.couplings)
-
-
-def project_last(prepared: Prepared, last: Float[Array, "*S D"]) -> tuple[Array, ...]:
-    """:func:`a2g_jax.nn.flow.coupling.project_last_condition` of every step."""
-    return tuple(project_last_condition(one, last) for one in prepared.couplings)
 
 
 def first_states(prepared: Prepared, shape: Shape, count: int, dtype: Any = jnp.float32) -> tuple[States, ...]:
@@ -147,18 +146,42 @@ def glow_inverse_step(
     history: Float[Array, "B H"],
     projected: tuple[Array, ...],
     states: tuple[States, ...],
+    guidance: float = 1.0,
 ) -> tuple[Float[Array, "B C"], tuple[States, ...]]:
     """:func:`glow_inverse` of one frame.
 
     Args:
         projected: this frame's rows of :func:`project`, (B, gates) for every step.
         states: after the previous frame.
+        guidance: of :func:`a2g_jax.nn.flow.coupling.coupling_inverse_step`.
     """
     x, after = z, []
     for one, matrix, bias, gates, state in reversed(
         list(zip(prepared.couplings, prepared.matrices, prepared.biases, projected, states, strict=True))
     ):
-        x, state = coupling_inverse_step(one, shape, x, history, gates, state)
+        x, state = coupling_inverse_step(one, shape, x, history, gates, state, guidance)
         x = x @ matrix - bias[None]
         after.append(state)
     return x, tuple(reversed(after))
+
+
+def glow_step(
+    prepared: Prepared,
+    shape: Shape,
+    x: Float[Array, "B C"],
+    history: Float[Array, "B H"],
+    projected: tuple[Array, ...],
+    states: tuple[States, ...],
+    guidance: float = 1.0,
+) -> tuple[Float[Array, "B C"], Float[Array, " B"]]:
+    """:func:`glow` of one frame: its latent, and the part of its log-determinant that depends on it.
+
+    Arguments of :func:`glow_inverse_step`.
+    """
+    log_det = jnp.zeros(x.shape[0], x.dtype)
+    for one, matrix, bias, gates, state in zip(
+        prepared.couplings, prepared.forward, prepared.biases, projected, states, strict=True
+    ):
+        x, more = coupling_step(one, shape, (x + bias[None]) @ matrix, history, gates, state, guidance)
+        log_det = log_det + more
+    return x, log_det
