@@ -58,12 +58,16 @@ def film_strips(path: Path, speech: Speech, rows: Sequence[Row]) -> None:
 
 
 def strip(motion: Motion, times: Sequence[float] | np.ndarray) -> Image.Image:
-    """The figure at these times, side by side: a page with a still figure for each."""
-    frames = [min(round(float(time) * motion.fps), motion.frames - 1) for time in times]
-    figures = [Figure(motion.clip(frame, frame + 1), " ") for frame in frames]
+    """The figure at these times, side by side: a page for each, since the page places several figures in ranks."""
+    width = WIDTH // len(times)
+    whole = Image.new("RGB", (WIDTH, HEIGHT), "white")
     with tempfile.TemporaryDirectory() as folder:
         page, shot = Path(folder) / "strip.html", Path(folder) / "strip.png"
-        write_page(page, figures, np.zeros(0, np.float32), 16000, title="strip")
-        screenshot_page(page, shot, width=WIDTH, height=HEIGHT, script=_STYLE)
-        with Image.open(shot) as image:
-            return image.convert("RGB")
+        for number, time in enumerate(times):
+            frame = min(round(float(time) * motion.fps), motion.frames - 1)
+            figure = Figure(motion.clip(frame, frame + 1), " ")
+            write_page(page, [figure], np.zeros(0, np.float32), 16000, title="strip")
+            screenshot_page(page, shot, width=width, height=HEIGHT, script=_STYLE)
+            with Image.open(shot) as image:
+                whole.paste(image.convert("RGB"), (width * number, 0))
+    return whole
