@@ -2,12 +2,13 @@
 
 from a2g_jax.models.entry import Entry
 from a2g_jax.models.stylized_flow.config import PRESETS, TRAINING_PRESETS, StylizedFlowConfig
-from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
+from a2g_jax.models.stylized_flow.sampling import SAMPLING_PRESETS, StylizedFlowSampling
 
 ENTRY = Entry(
     config=StylizedFlowConfig,
     presets=PRESETS,
     build="a2g_jax.models.stylized_flow.model:build",
     sampling=StylizedFlowSampling,
+    sampling_presets=SAMPLING_PRESETS,
     training=TRAINING_PRESETS,
 )
