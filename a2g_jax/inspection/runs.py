@@ -55,8 +55,8 @@ def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
         for line in log
         if line.get("split") == "validation" and line.get("loss") is not None and line.get("step", 0) > stage.first
     ]
-    # Losses below zero, as of likelihoods, have no ratio.
-    if len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
+    # Losses below zero, as of likelihoods, have no ratio; those of players of a game rise and fall with one another.
+    if len(stage.stage.updates) == 1 and len(checked) > 2 and min(checked) > 0 and checked[-1] > _WORSE * min(checked):
         message = f"the last validation loss, {checked[-1]:.4g}, is {checked[-1] / min(checked):.2f} times the best."
         fix = "It overfits: train on more recordings, or for fewer steps."
         findings.append(Finding("info", "overfitting", message, fix, value=checked[-1] / min(checked)))

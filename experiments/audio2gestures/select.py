@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from a2g_jax.errors import InputError
+from a2g_jax.models import find_model
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import over_seeds
 from experiments.tables.markdown import compute, render
@@ -23,11 +24,12 @@ TABLE = "audio2gestures/selection"
 #: Seeds of the tables.
 REPORTED = (0, 1, 2)
 #: Changes of the tables' settings.
+_KL = find_model("audio2gestures").presets["tiny"].kl_specific_weight
 CANDIDATES: Mapping[str, Mapping[str, Any]] = {
     "the tables' settings": {},
     "diversity x 0.2": {"diversity_weight": 0.2 * BASE["diversity_weight"]},
-    "KL of I x 4": {"kl_specific_weight": 4.0 * BASE["kl_specific_weight"]},
-    "KL of I / 4": {"kl_specific_weight": 0.25 * BASE["kl_specific_weight"]},
+    "KL of I x 4": {"kl_specific_weight": 4.0 * _KL},
+    "KL of I / 4": {"kl_specific_weight": 0.25 * _KL},
 }
 VARIANTS = {name: Variant({**BASE, **changes}) for name, changes in CANDIDATES.items()}
 #: Smallest share of the truth's wrist speed.

@@ -210,9 +210,10 @@ def test_run(tmp_path):
     report = inspect(DEMO)
     assert report.warnings == 0
     assert report.facts["run"]["parameters"] == sum(report.facts["run"]["of which"].values())
-    assert report.facts["training settings"]["steps"] == report.facts["run"]["steps"]
+    stages = report.facts["training settings"]["steps"], report.facts["model settings"]["adversarial_steps"]
+    assert sum(stages) == report.facts["run"]["steps"]
     run = tmp_path / "run"
-    shutil.copytree(DEMO, run)
+    shutil.copytree(DEMO.parent / "demo_flow", run)
     about = json.loads((run / "run.json").read_text())
     about["steps"] -= 1000
     (run / "run.json").write_text(json.dumps(about))
