@@ -280,7 +280,7 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     assert main([*generate, "--out", str(tmp_path / "other"), "--formats", "npz", "--seed", "1"]) == 0
     other = read_motion_npz(tmp_path / "other" / "sample_00.npz")
     assert np.abs(other.rotations - motion.rotations).max() > 1e-3
-    assert json.loads((tmp_path / "run" / "run.json").read_text())["steps"] == 8
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["steps"] == 10
 
 
 def test_any_rig_trains_as_it_is(capsys, tmp_path):

@@ -169,7 +169,8 @@ def _random_codes(
         needed = any(getattr(config, f"{name}_weight") > 0 for name in _OF_RANDOM_CODES)
         return [jax.lax.stop_gradient(jnp.roll(steps, by, axis=0)) for by in (1, 2)] if needed else [], None
     if not config.mapping:
-        return [jax.random.normal(key, steps.shape, steps.dtype) for key in keys[1:]], None
+        drawn = jax.random.normal(keys[2], (2 * len(steps), *steps.shape[1:]), steps.dtype)
+        return list(jnp.split(drawn, 2)), None
     # DCT bands are mapped from noise with the statistics of the code in time.
     frames = codec.to_frames(steps)
     mapped = codec.map_noise(params, jnp.concatenate([code_noise(key, frames) for key in keys[:2]]))
