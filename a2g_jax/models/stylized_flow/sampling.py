@@ -12,9 +12,9 @@ class StylizedFlowSampling:
 
     temperature: float = 1.0
     """Scale of the latents; 1 is the scale of training."""
-    denoise: bool = True
-    """Whether the noise of training is removed from what is generated:
-    :mod:`a2g_jax.models.stylized_flow.autoregression`."""
+    denoise: bool = False
+    """Whether the noise of training is removed from what is generated (Tweedie's formula), for runs without --stride:
+    :mod:`a2g_jax.models.stylized_flow.autoregression`. Noise of spline knots is a thirtieth of that of frames."""
     style_guidance: float = 1.0
     """Weight of a style clip's code, for runs with --style-channels: 1 as in training, more for a stronger style."""
     style_gain: float = 1.0
