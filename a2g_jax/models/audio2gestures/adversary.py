@@ -25,6 +25,8 @@ from a2g_jax.nn.strided import StridedConv1D
 #: rotations; speeds are in three of the first a second.
 _METRES, _SCORES, _TURNS, _SECONDS = 0.1, 1.0, 0.3, 3.0
 _SLOPE = 0.2
+#: Added to the size of features before division.
+_EPSILON = 1e-6
 #: Learning rate of the decoder in the game.
 _RATE = 3e-4
 #: The discriminator's, relative to it.
@@ -115,14 +117,11 @@ def adversarial_stage(codec: Codec) -> Stage:
         judge_params = jax.lax.stop_gradient(params["discriminator"])
         ours = judged(judge_params, pose[: 2 * clips], jnp.concatenate([shared] * 2))
         theirs = judged(judge_params, batch.pose, shared)
-        terms = {
-            "adversarial": -jnp.mean(ours[-1]),
-            "matching": sum(
-                jnp.mean(jnp.abs(a[clips:] - jax.lax.stop_gradient(b)))
-                / (jnp.mean(jnp.abs(jax.lax.stop_gradient(b))) + 1e-6)
-                for a, b in zip(ours[:-1], theirs[:-1], strict=True)
-            ),
-        }
+        distances = [
+            jnp.mean(jnp.abs(a[clips:] - b)) / (jnp.mean(jnp.abs(b)) + _EPSILON)
+            for a, b in zip(ours[:-1], jax.lax.stop_gradient(theirs[:-1]), strict=True)
+        ]
+        terms = {"adversarial": -jnp.mean(ours[-1]), "matching": jnp.sum(jnp.stack(distances))}
         loss = config.adversarial_weight * terms["adversarial"] + config.matching_weight * terms["matching"]
         loss = loss + sum(weights[name] * regression[name] for name in regression)
         return loss, terms | regression

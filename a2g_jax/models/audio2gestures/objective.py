@@ -20,8 +20,10 @@ from a2g_jax.nn.rates import shifted
 Terms = dict[str, Array]
 
 #: Losses of motions with random codes.
-_OF_RANDOM_CODES = ("relaxed", "sampled_rotation", "sampled_speed", "sampled_stft", "diversity")
-_OF_RANDOM_CODES += ("bicycle", "bicycle_shared")
+_OF_RANDOM_CODES = (
+    *("relaxed", "sampled_rotation", "sampled_speed", "sampled_stft"),
+    *("diversity", "bicycle", "bicycle_shared"),
+)
 #: Smallest share of the KL weights at the beginning of a ramp that restarts, as in the authors' code.
 _LOWEST_RAMP = 1e-4
 #: Added to the losses of a motion that stands still, for batches without any motion.

@@ -56,6 +56,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
             stay = 1.0 - config.control_dropout
             found = found._replace(shown=jax.random.bernoulli(show_key, stay, (clips, 1, len(config.style_controls))))
         if config.style_channels:
+            assert batch.other_pose is not None
             code = networks.style(params, networks.flat(batch.other_pose))
             found = found._replace(
                 style=code, styled=jax.random.bernoulli(style_key, 1.0 - config.style_dropout, (clips,))
