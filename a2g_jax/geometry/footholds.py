@@ -30,6 +30,10 @@ _REACH = 0.999
 _ITERATIONS = 4
 
 
+#: Metres by which hips are lowered at most.
+_LOWEST = 0.05
+
+
 class Leg(NamedTuple):
     """Joints of a leg."""
 
@@ -91,22 +95,18 @@ def _goal(
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 3"]]:
     """Where an ankle goes and how it is turned: its foothold while the foot stands, its own path in a step."""
     stands = ~_steps(place, fps)
-    weight = _weights(stands, fps)
-    target, orientation = place.copy(), world.copy()
+    target, turned, own = place.copy(), np.zeros_like(place), Rotation.from_matrix(world)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
-    holds = [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
-    for number, (first, stop) in enumerate(holds):
-        # Up to the middle of the steps on either side, where the weight is 0.
-        begin = 0 if number == 0 else (holds[number - 1][1] + first) // 2
-        end = len(place) if number == len(holds) - 1 else (stop + holds[number + 1][0]) // 2
+    for first, stop in edges.reshape(-1, 2):
+        # Each foothold has a weight of its own, so that a short step passes from one to the next without a jump. They
+        # sum to 1 or less: between two stands lies more than twice the reach of a weight.
+        only = np.zeros(len(place), bool)
+        only[first:stop] = True
+        share = _weights(only, fps)[:, None]
         foothold, turn = place[first:stop].mean(axis=0), Rotation.from_matrix(world[first:stop]).mean()
-        part = slice(begin, end)
-        share = weight[part, None]
-        target[part] = share * foothold + (1.0 - share) * place[part]
-        own = Rotation.from_matrix(world[part])
-        away = (turn * own.inv()).as_rotvec()
-        orientation[part] = (Rotation.from_rotvec(share * away) * own).as_matrix()
-    return target, orientation
+        target += share * (foothold - place)
+        turned += share * (turn * own.inv()).as_rotvec()
+    return target, (Rotation.from_rotvec(turned) * own).as_matrix()
 
 
 def _steps(place: Float[np.ndarray, "T 3"], fps: float) -> Bool[np.ndarray, " T"]:
@@ -132,10 +132,11 @@ def _weights(stands: Bool[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " 
 
 
 def _too_far(hip: Float[np.ndarray, "T 3"], target: Float[np.ndarray, "T 3"], reach: float) -> Float[np.ndarray, " T"]:
-    """Metres by which a hip has to be lower for the leg to reach its target; 0 where it does."""
+    """Metres by which a hip has to be lower for the leg to reach its target; 0 where it does, 5 cm at most."""
     across = np.linalg.norm((target - hip)[:, [0, 2]], axis=-1)
     most = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
-    return np.maximum(hip[:, 1] - target[:, 1] - most, 0.0)
+    # A foot that creeps for seconds has a mean place that no leg reaches; its leg is stretched instead.
+    return np.clip(hip[:, 1] - target[:, 1] - most, 0.0, _LOWEST)
 
 
 def _smooth_above(values: Float[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " T"]:

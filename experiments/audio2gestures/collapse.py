@@ -128,23 +128,18 @@ def main() -> None:
             if options.only and options.only not in (poses, f"{poses}/{backbone}"):
                 continue
             corpus = Corpus.open(options.corpora / poses)
-            key = {
-                "poses": poses,
-                "backbone": backbone,
-                "seed": seed,
-                "steps": options.steps,
-                "corpus": name_of(corpus),
-            }
-            if any(all(record.get(name) == value for name, value in key.items()) for record in records(TABLE)):
-                continue
             adversarial = options.steps // 3
             first = options.steps - adversarial
             where = Setting(options.corpora / poses, None, options.runs, first, _SAMPLES, (seed,), 1e9)
             variant = Variant({"backbone": backbone, "adversarial_steps": adversarial}, training={"batch_size": 4})
             digest, config = described("run", variant, {}, seed, corpus, where)
+            key: dict[str, Any] = {"poses": poses, "backbone": backbone, "seed": seed, "steps": options.steps}
+            key |= {"corpus": name_of(corpus), "settings": digest}
+            if any(all(record.get(name) == value for name, value in key.items()) for record in records(TABLE)):
+                continue
             run, seconds, computing = trained(config, variant, corpus, where)
             figures = measured(run, corpus, seed)
-            append(TABLE, {**key, "settings": digest, "seconds": seconds, "cpu_seconds": computing, **figures})
+            append(TABLE, {**key, "seconds": seconds, "cpu_seconds": computing, **figures})
             print(f"{poses}, {backbone}, seed {seed}: {figures}", flush=True)
     path_of(TABLE, ".md").write_text(page(), encoding="utf-8")
     print(page())

@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.geometry.body_joints import find_body_joints
-from a2g_jax.geometry.footholds import lock_feet
+from a2g_jax.geometry.footholds import _goal, lock_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.talker.recordings import talk
@@ -86,3 +86,20 @@ def test_skeletons_without_legs_are_left_as_they_are():
     skeleton = Skeleton(np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32), ("a", "b"), (-1, 0))
     motion = Motion(np.tile(np.eye(3, dtype=np.float32), (5, 2, 1, 1)), np.zeros((5, 3), np.float32), skeleton, 30.0)
     assert lock_feet(motion) is motion
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.2, 0.3])
+def test_a_step_passes_from_one_foothold_to_the_next_without_a_jump(seconds):
+    """12 cm in a smooth step at 30 fps, between two stands that shake; slower ones count as standing."""
+    time = (np.arange(180) / 30.0 - 3.0) / seconds + 0.5
+    place = np.zeros((180, 3))
+    place[:, 0] = 0.12 * (lambda x: x * x * (3.0 - 2.0 * x))(np.clip(time, 0.0, 1.0))
+    place[:, 0] += 0.002 * np.sin(np.arange(180))
+    world = np.broadcast_to(np.eye(3), (180, 3, 3))
+    target, orientation = _goal(place, world, 30.0)
+    largest = np.abs(np.diff(target[:, 0])).max()
+    assert largest < 1.5 * np.abs(np.diff(place[:, 0])).max()
+    assert np.ptp(target[:40, 0]) < 1e-9
+    assert np.ptp(target[-40:, 0]) < 1e-9
+    assert target[-1, 0] - target[0, 0] == pytest.approx(0.12, abs=0.002)
+    np.testing.assert_allclose(orientation, world, atol=1e-9)

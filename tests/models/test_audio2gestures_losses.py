@@ -76,7 +76,7 @@ class TestValues:
 
     def test_equal_joint_weights_are_none(self):
         first, second = positions(0), positions(1)
-        for loss in (losses.position_loss, losses.speed_loss, losses.diversity_loss):
+        for loss in (losses.position_loss, losses.speed_loss):
             assert on_arrays(loss)(first, second, np.full(3, 7.0)) == pytest.approx(on_arrays(loss)(first, second))
 
     def test_speed(self):
@@ -142,10 +142,6 @@ class TestValues:
         assert on_arrays(losses.spread_loss)(np.full((2, 4, 5), 3.0)) == pytest.approx(0.99)
         assert on_arrays(losses.spread_loss)(10 * code) == 0
 
-    def test_diversity_rewards_distance(self):
-        first, second = positions(0), positions(1)
-        assert on_arrays(losses.diversity_loss)(first, second) == pytest.approx(-l1(first, second).mean())
-
 
 class TestGradients:
     @pytest.mark.parametrize("weights", [None, WEIGHTS])
@@ -177,7 +173,7 @@ class TestGradients:
         assert np.isfinite(gradient).all()
         assert (np.abs(gradient).sum(axis=-1)[1, :, 0] > 0).all()
 
-    @pytest.mark.parametrize("loss", [losses.position_loss, losses.speed_loss, losses.diversity_loss])
+    @pytest.mark.parametrize("loss", [losses.position_loss, losses.speed_loss])
     def test_positions(self, loss):
         assert_gradient(loss, positions(0), positions(1))
         assert_gradient(lambda a, b: loss(a, b, jnp.asarray(WEIGHTS)), positions(0), positions(1))
@@ -188,7 +184,7 @@ class TestGradients:
         )
         assert (np.abs(gradient).sum(axis=(0, 1, 3)) > 0).tolist() == [True, False, True]
 
-    @pytest.mark.parametrize("loss", [losses.position_loss, losses.speed_loss, losses.diversity_loss])
+    @pytest.mark.parametrize("loss", [losses.position_loss, losses.speed_loss])
     def test_equal_positions_are_finite(self, loss):
         same = jnp.asarray(positions(0))
         for gradient in jax.grad(loss, (0, 1))(same, same):

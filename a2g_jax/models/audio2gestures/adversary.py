@@ -143,11 +143,12 @@ def _codes(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> t
     shared = codec.encode_audio(frozen, batch.audio).mean
     s_motion, specific = codec.encode_motion(frozen, batch.pose)
     assert specific is not None
-    encoded = codec.specific_to_frames(specific.sample(keys[0]))
+    steps = specific.sample(keys[0])
+    encoded = codec.specific_to_frames(steps)
     if config.stored_codes:
         drawn = jnp.roll(encoded, 1, axis=0)
     elif config.mapping:
-        noise = code_noise(keys[1], jnp.roll(specific.mean, 1, axis=0))
+        noise = code_noise(keys[1], jnp.roll(steps, 1, axis=0))
         drawn = codec.specific_to_frames(codec.map_noise(frozen, noise).mean)
     else:
         drawn = codec.specific_to_frames(jax.random.normal(keys[1], specific.mean.shape, specific.mean.dtype))

@@ -26,7 +26,7 @@ class Codec:
     """The four networks with the pose space around them.
 
     Codes are in time, or with the DCT latent space in the bands of consecutive blocks; decoding takes them in time:
-    see :meth:`to_time`.
+    see :meth:`to_frames` and :meth:`specific_to_frames`.
     """
 
     config: Audio2GesturesConfig

@@ -49,7 +49,7 @@ class Audio2GesturesConfig:
     """Whether networks take and predict 6D rotations as z-scores of the training split; the papers use them raw."""
     smoothing: int = 0
     """Binomial filters over time at the decoder's end, trained with it; none in the papers. Motion has no energy at the
-    frame rate, but a decoder of frame-wise codes trembles there."""
+    frame rate, but a decoder of frame-wise codes has jitter there."""
     initialisation: str = "xavier"
     """Initial weights: ``xavier`` (uniform, as in the papers), or ``normal`` with a standard deviation of 0.01 (the
     authors' code)."""
@@ -107,8 +107,8 @@ class Audio2GesturesConfig:
     """``paper``: distances summed over x, y, z and averaged over the joints; KL averaged over frames, summed over
     channels. ``authors``: their code's, see :mod:`a2g_jax.models.audio2gestures.reductions`."""
     relative_losses: bool = False
-    """Whether motion losses are divided by those of the batch's mean pose, so that the weights fit every pose
-    representation and frame rate: 1 is a motion that stands still."""
+    """Whether rotation, position and speed losses are divided by those of the batch's mean pose, so that the weights
+    fit every pose representation and frame rate: 1 is a motion that stands still."""
     relaxed_weight: float = 1.0
     relaxed_threshold: float = 0.002
     """Rho of the relaxed motion loss (Eq. 19), metres: 0.2 cm in the extended paper, 2 cm in the first."""

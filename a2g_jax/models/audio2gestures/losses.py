@@ -71,10 +71,3 @@ def bicycle_loss(code: Float[Array, "B T C"], recovered: Float[Array, "B T C"]) 
     shrink to a constant. The paper does not specify this.
     """
     return jnp.mean(jnp.abs(code - recovered))
-
-
-def diversity_loss(
-    first: Positions, second: Positions, joint_weights: Float[Array, " J"] | None = None
-) -> Float[Array, ""]:
-    """Negative position distance of two motions sampled for the same clip (Eq. 21 as its text describes it), metres."""
-    return -position_loss(first, second, joint_weights)

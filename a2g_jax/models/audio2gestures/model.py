@@ -51,7 +51,8 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
             return {}
         if config.stored_codes:
             return {"specific_code": specific.mean.astype(jnp.float16)}
-        code = codec.specific_to_frames(specific.sample(key))
+        # Over its steps, as the noise has in training: interpolation would narrow it.
+        code = codec.to_frames(specific.sample(key))
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
     def condition(params: Params, summary: Summary, given: Condition) -> Gaussian:
@@ -177,12 +178,12 @@ def _stored(key, codes, sampling, first, count, size):
 
     Args:
         codes: of training clips, (clips, steps, C).
-        first: number of the first step in the whole audio; may be negative.
+        first: number of the first step in the whole audio; may be negative, where the first step is repeated.
         count: steps.
         size: frames of a step.
     """
     clips, length, _ = codes.shape
-    number = first + jnp.arange(count)
+    number = jnp.maximum(first + jnp.arange(count), 0)
     # Without redrawing, one clip is followed by the next one of the training split.
     period = max(1, -(-sampling.redraw_frames // (size * length))) * length if sampling.redraw_frames else 2**20
     draw = lambda n: jax.random.randint(jax.random.fold_in(key, n.astype(jnp.uint32)), (), 0, clips)  # noqa: E731

@@ -16,7 +16,7 @@ class Audio2GesturesSampling:
 
     0 keeps one draw for the whole audio, as the authors do; then a latent choice such as the gesturing hand tends
     to stay the same throughout a long speech. With stored codes, frames after which another training clip is drawn,
-    in whole clips; 0 for one clip of the training split after another.
+    in whole clips and without blending beyond one step of the code; 0 for one stored clip after another.
     """
     sample_codes: bool = True
     """Whether codes are drawn from their posteriors, as the authors do; otherwise their means are used (smoother)."""

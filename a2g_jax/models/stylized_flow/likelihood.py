@@ -2,7 +2,7 @@
 
 A frame's density is that of its z-scores given the poses before it and the audio around it; over a clip the
 logarithms add up to that of the whole, since the density of a frame depends on no later one (MoGlow, Eq. 5). Channels
-that hardly move are left out where ``least_std`` says so. With a ``stride``, the density is that of the spline's knots,
+that hardly move, below ``least_std``, are left out. With a ``stride``, the density is that of the spline's knots,
 and that of a knot is spread evenly over the frames up to the next one.
 
 Poses have a little normal noise in training (``input_noise``), so the learned density is that of poses *plus noise*:

@@ -69,7 +69,7 @@ def speak_clause(library: Espeak, clause: Clause, delivery: Delivery, clock: Acc
     utterance = library.speak(clause.text, delivery.voice, delivery.rate, delivery.pitch)
     words = spoken_words(clause.text, utterance)
     if not words:
-        raise InputError(f"{library.version} says nothing for {clause.text!r}.")
+        raise InputError(f"{library.version} gives no speech for {clause.text!r}.")
     unaccented = function_words(delivery.language.name)
     content = [index for index, word in enumerate(words) if word.text not in unaccented]
     accents, target = [0.0] * len(words), [0.0]

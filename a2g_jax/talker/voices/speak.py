@@ -1,6 +1,6 @@
 """Speech plan and audio of a recording in a real language.
 
-The library says each clause on one pitch. What speaker, emotion and accents do to it is ours, and the same as for the
+The library speaks each clause on one pitch. What speaker, emotion and accents do to it is ours, and the same as for the
 invented voice (:mod:`a2g_jax.talker.prosody`): melody, level, lengthening, irregular periods, spectral slope, breath.
 """
 
