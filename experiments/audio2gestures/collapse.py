@@ -133,8 +133,8 @@ def main() -> None:
             where = Setting(options.corpora / poses, None, options.runs, first, _SAMPLES, (seed,), 1e9)
             variant = Variant({"backbone": backbone, "adversarial_steps": adversarial}, training={"batch_size": 4})
             digest, config = described("run", variant, {}, seed, corpus, where)
-            key: dict[str, Any] = {"poses": poses, "backbone": backbone, "seed": seed, "steps": options.steps}
-            key |= {"corpus": name_of(corpus), "settings": digest}
+            key: dict[str, Any] = {"variant": f"{poses}, {backbone}", "seed": seed, "steps": options.steps}
+            key |= {"poses": poses, "backbone": backbone, "corpus": name_of(corpus), "settings": digest}
             if any(all(record.get(name) == value for name, value in key.items()) for record in records(TABLE)):
                 continue
             run, seconds, computing = trained(config, variant, corpus, where)

@@ -79,7 +79,7 @@ def revoice(
     Args:
         speech: what to change.
         source: increasing moments of the speech, seconds.
-        target: where they shall be.
+        target: their places in the result.
         times: moments of the result, from 0.
         f0: wanted pitch at ``times``, Hz.
         size: of the speaker: divides all formant frequencies.
