@@ -62,7 +62,12 @@ def real_takes(
         cache: folder of the figures.
     """
     code = digest(
-        code_digest([Path(__file__).parent / name for name in ("real.py", "statistics.py", "resampling.py")]),
+        code_digest(
+            [
+                Path(__file__).parent / name
+                for name in ("real.py", "statistics.py", "resampling.py", "rows.py", "speeches.py", "__main__.py")
+            ]
+        ),
         source_digest("metrics", "geometry"),
     )
     takes: dict[str, dict[str, Any]] = {}
