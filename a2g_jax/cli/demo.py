@@ -5,11 +5,15 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.cli import sampling
-from a2g_jax.cli.paths import existing_file
+from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.errors import InputError
+from a2g_jax.progress import progress_bar
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
 #: Minutes of generated recordings that ``--train`` trains on.
 DEMO_MINUTES = 20.0
+#: Motions of each system with ``--compare``.
+COMPARED_SAMPLES = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,22 +21,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--audio", metavar="FILE", help="your speech (default: a short English one of the package)")
     parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
     parser.add_argument(
-        "--out",
-        default="demo",
-        metavar="DIR",
-        help="folder to write to; files of an earlier call in it are replaced (default: demo)",
+        "--compare",
+        nargs="*",
+        metavar="RUN",
+        help="all systems with included weights on one page, beside the true talker of the package's speech; and these"
+        " runs",
     )
-    sampling.add_arguments(parser)
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="folder to write to; files of an earlier call in it are replaced (default: demo; with --compare"
+        " comparison)",
+    )
+    sampling.add_arguments(
+        parser, None, f"default: {sampling.SAMPLES}; with --compare {COMPARED_SAMPLES} of each system"
+    )
 
 
 def run(options: argparse.Namespace, _extra: list[str]) -> None:
     """Generate, write and print.
 
     Raises:
-        InputError: audio or a folder that cannot be used.
+        InputError: audio, a run or a folder that cannot be used, or flags that exclude each other.
     """
     existing_file(options.audio)
+    comparing = options.compare is not None
+    if comparing and options.train:
+        raise InputError("--train and --compare exclude each other; train first, then name the run: --compare RUN.")
+    options.out = options.out or ("comparison" if comparing else "demo")
+    options.samples = options.samples or (COMPARED_SAMPLES if comparing else sampling.SAMPLES)
+    (_compare if comparing else _demo)(options)
 
+
+def _demo(options: argparse.Namespace) -> None:
+    """Motions of the default run, or of a newly trained one."""
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.features.mel import MelConfig
     from a2g_jax.generation.generator import Generator
@@ -50,6 +72,33 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         audio, title, words = speech.audio, "the speech of the demo", speech.words
     trained = _train(Path(options.out)) if options.train else demo_run()
     sampling.write_samples(trained, Generator(trained), audio, options, title, words=words)
+
+
+def _compare(options: argparse.Namespace) -> None:
+    """Motions of all systems on one page."""
+    for name in options.compare:
+        existing_run(name)
+
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.generation.comparison import Speech, compare, demo_speech_with_truth, systems
+    from a2g_jax.io.audio import read_audio
+
+    keep_compilations()
+    speech = demo_speech_with_truth()
+    if options.audio is not None:
+        speech = Speech(Path(options.audio).name, lambda sample_rate: read_audio(options.audio, sample_rate))
+    runs = systems(options.compare)
+    with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
+        written = compare(
+            runs,
+            speech,
+            options.out,
+            samples=options.samples,
+            seed=options.seed,
+            formats=options.formats,
+            report=lambda: bar.update(),
+        )
+    sampling.print_written(options.out, written)
 
 
 def _train(out: Path) -> Any:

@@ -15,10 +15,20 @@ if TYPE_CHECKING:
     from a2g_jax.training.run import Run
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--samples``, ``--seed`` and ``--formats``."""
+#: Number of motions, unless ``--samples`` gives another.
+SAMPLES = 5
+
+
+def add_arguments(
+    parser: argparse.ArgumentParser, samples: int | None = SAMPLES, default: str = f"default: {SAMPLES}"
+) -> None:
+    """Add ``--samples``, ``--seed`` and ``--formats``.
+
+    Args:
+        samples: the default of ``--samples``, which ``default`` describes.
+    """
     known = format_names()
-    parser.add_argument("--samples", type=count, default=5, help="number of motions (default: 5)")
+    parser.add_argument("--samples", type=count, default=samples, help=f"number of motions ({default})")
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument(
         "--formats",

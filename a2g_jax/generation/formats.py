@@ -129,7 +129,7 @@ class MotionFiles:
         self.folder = make_folder(out)
         self._stem = stem
         suffixes = "|".join(re.escape(each.suffix) for each in (MOTION_FORMATS | self._formats).values())
-        own = re.compile(rf"{stem}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
+        own = re.compile(rf"{re.escape(stem)}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
         for old in self.folder.iterdir():
             if own.fullmatch(old.name) and not old.is_dir():
                 old.unlink()

@@ -18,6 +18,7 @@ from a2g_jax.io.files import read_json, write_json
 from a2g_jax.recording import Recording, Word
 from a2g_jax.talker.gestures import gesticulate
 from a2g_jax.talker.speech import plan_from_json, plan_to_json
+from a2g_jax.talker.truth import GestureTruth
 
 DEMO_TEXT = (
     "Hello, and welcome. When people talk, their hands talk too. I can tell you the same story twice, and my hands will"
@@ -31,20 +32,26 @@ _AUDIO, _PLAN = "speech.flac", "speech.json"
 
 def demo_speech() -> Recording:
     """The recording that ``a2g demo`` makes motions for, with a motion of the talker."""
+    return demo_recording()[0]
+
+
+def demo_recording(sample_rate: int = SAMPLE_RATE) -> tuple[Recording, GestureTruth]:
+    """The recording of :func:`demo_speech` at a sample rate, and the hidden choices of its motion."""
     folder = files(__package__).joinpath("demo")
     with as_file(folder.joinpath(_AUDIO)) as audio, as_file(folder.joinpath(_PLAN)) as plan:
-        sound, speech = read_audio(audio, SAMPLE_RATE), plan_from_json(read_json(plan))
+        sound, speech = read_audio(audio, sample_rate), plan_from_json(read_json(plan))
     motion, truth = gesticulate(speech, np.random.default_rng(_SEED))
-    return Recording(
+    recording = Recording(
         name="demo",
         audio=sound,
-        sample_rate=SAMPLE_RATE,
+        sample_rate=sample_rate,
         motion=motion,
         words=tuple(Word(word.text, word.start, word.end) for word in speech.words),
         speaker=speech.speaker,
         emotion=speech.emotion,
         annotations={"speech": plan_to_json(speech), "gestures": asdict(truth)},
     )
+    return recording, truth
 
 
 def _make(folder: Path) -> None:

@@ -8,10 +8,14 @@ function margins(row, rows, phone, overlay) {
   return { top: row === 0 ? (overlay ? 74 : 52) : 18, bottom: overlay ? 22 : (phone && row === rows - 1 ? 84 : 62), side: phone ? 8 : 26 };
 }
 
+const LABEL = 88; // CSS pixels that a figure's label needs to be legible
+
 function chooseRows(count, spacing, tall, width, height) {
   let best = 1, bestScale = 0;
-  for (let rows = count > 6 ? 2 : 1; rows <= Math.min(count, 4); rows++) {
+  const most = Math.min(count, 4);
+  for (let rows = count > 6 ? 2 : 1; rows <= most; rows++) {
     const columns = Math.ceil(count / rows);
+    if (width / columns < LABEL && rows < most) continue;
     const scale = Math.min((height / rows - 90) / tall, width / (columns * spacing));
     if (scale > bestScale * 1.08) { best = rows; bestScale = scale; }
   }
@@ -25,9 +29,9 @@ function arrange(figures, visible, overlay, width, height) {
   let spacing = clamp(1.4 * reach, 0.5 * tall, 1.3 * tall);
   const rows = overlay ? 1 : chooseRows(visible.length, spacing, tall, width, height);
   const columns = overlay ? visible.length : Math.ceil(visible.length / rows), phone = width < 640;
-  // Where height decides the size, use the width that is left, within reason.
-  const metre = (height / rows - 80) / (1.1 * tall), fills = (width - 60) / (columns * metre);
-  if (!overlay) spacing = Math.max(spacing, Math.min(fills, 0.95 * tall));
+  // Where height decides the size, use the width that is left, within reason and for the labels.
+  const metre = (height / rows - 80) / (1.1 * tall), fills = (width - (phone ? 20 : 60)) / (columns * metre);
+  if (!overlay) spacing = Math.max(spacing, Math.min(fills, Math.max(0.95 * tall, 1.4 * LABEL / metre)));
   const bands = [];
   for (let row = 0; row < rows; row++) {
     const members = visible.slice(row * columns, (row + 1) * columns);

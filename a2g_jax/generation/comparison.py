@@ -1,0 +1,152 @@
+"""Systems side by side: motions of several runs for one speech, beside the talker's own motion where there is one."""
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
+from a2g_jax.generation.generator import Generator, audio_frames
+from a2g_jax.generation.talk.page import gesture_lane
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.words import Word
+from a2g_jax.talker.demo_speech import demo_recording
+from a2g_jax.talker.speech import plan_from_json
+from a2g_jax.training.run import Run, open_run
+from a2g_jax.training.run_file import SHIPPED
+from a2g_jax.viz.player import Figure, write_page
+
+#: Stem of the files of the talker's own motion.
+TALKER = "talker"
+
+
+@dataclass(frozen=True, eq=False)
+class Speech:
+    """The speech of a comparison."""
+
+    title: str
+    """Its name, for the page's heading."""
+    audio: Callable[[int], Float[np.ndarray, " N"]]
+    """Mono samples at a sample rate."""
+    words: Sequence[Word] = ()
+    truth: Figure | None = None
+    """The motion that the speech was generated with; None where no motion belongs to it."""
+
+
+def demo_speech_with_truth() -> Speech:
+    """The speech of ``a2g demo`` with the motion of its talker."""
+    recording, truth = demo_recording()
+    plan = plan_from_json(recording.annotations["speech"])
+    figure = Figure(recording.motion, TALKER, "the true motion", (gesture_lane(truth, plan),))
+
+    def audio(sample_rate: int) -> Float[np.ndarray, " N"]:
+        return demo_recording(sample_rate)[0].audio
+
+    return Speech("the speech of the demo", audio, recording.words, figure)
+
+
+def systems(others: Sequence[str] = ()) -> dict[str, Run]:
+    """The shipped runs that generate motion of a skeleton from audio, then other runs, by name.
+
+    Args:
+        others: folders of runs, or names of shipped ones.
+
+    Raises:
+        InputError: not a run, one that does not animate a skeleton, or two of one name.
+    """
+    found = {name: run for name in SHIPPED if _animates(run := open_run(name))}
+    for folder in others:
+        if folder in SHIPPED:
+            continue
+        run, name = open_run(folder), Path(folder).resolve().name
+        _ = run.config.skeleton  # keypoints and directions are refused
+        if run.config.build().sample is None:
+            raise InputError(f"{folder}: is a run of {run.config.model}, which generates no motion; leave it out.")
+        if name in found or name == TALKER:
+            raise InputError(f"{folder}: another system of the page has the name {name!r}; rename the folder.")
+        found[name] = run
+    return found
+
+
+def _animates(run: Run) -> bool:
+    return run.config.space.has_rotations and run.config.build().sample is not None
+
+
+def compare(
+    runs: Mapping[str, Run],
+    speech: Speech,
+    out: str | os.PathLike[str],
+    *,
+    samples: int,
+    seed: int,
+    formats: Sequence[str],
+    report: Callable[[], None] = lambda: None,
+) -> dict[str, int]:
+    """Write the motions of every run for a speech, and one page of them all.
+
+    Files are named after the runs: ``demo_00.bvh``, ``demo_01.bvh``, ..., and ``talker_00.bvh`` for the truth. Each run
+    generates as alone: its sample k is that of ``a2g generate RUN`` with the same seed.
+
+    Args:
+        runs: by name.
+        samples: motions of each run.
+        formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
+        report: called after each motion of a run.
+
+    Returns:
+        How many files of each format were written.
+
+    Raises:
+        InputError: a folder that cannot be used, audio shorter than a frame, or too large a page.
+    """
+    first = next(iter(runs.values())).config
+    audio = {run.config.mel.sample_rate: speech.audio(run.config.mel.sample_rate) for run in runs.values()}
+    if PAGE in formats:
+        sizes = [(audio_frames(run, audio[run.config.mel.sample_rate]), run.config.skeleton) for run in runs.values()]
+        frames, body = max(sizes, key=lambda size: size[0] * size[1].joints)
+        check_page_size(samples * len(runs) + 1, frames, body.joints)
+    # This removes the talker's motion of an earlier speech, also where this one has none.
+    written = {name: MotionFiles(out, name, formats) for name in (TALKER, *runs)}
+    figures = [] if speech.truth is None else [speech.truth]
+    for name, number, motion in _motions(runs, audio, samples, seed):
+        written[name].write(number, motion)
+        figures.append(Figure(motion, f"{name} {number}" if samples > 1 else name, runs[name].config.model))
+        report()
+    if speech.truth is not None:
+        written[TALKER].write(0, speech.truth.motion)
+    if PAGE in formats:
+        write_page(
+            written[TALKER].folder / "index.html",
+            figures,
+            audio[first.mel.sample_rate],
+            first.mel.sample_rate,
+            title=f"{_count(len(runs))} for {speech.title}",
+            subtitle=_subtitle(speech, samples, seed),
+            words=speech.words,
+        )
+    return {kind: 1 if kind == PAGE else len(figures) for kind in formats}
+
+
+def _motions(
+    runs: Mapping[str, Run], audio: Mapping[int, Float[np.ndarray, " N"]], samples: int, seed: int
+) -> Iterator[tuple[str, int, Motion]]:
+    for name, run in runs.items():
+        for number, motion in enumerate(Generator(run).stream(audio[run.config.mel.sample_rate], samples, seed)):
+            yield name, number, motion
+
+
+def _count(runs: int) -> str:
+    words = ("No systems", "One system", "Two systems", "Three systems", "Four systems", "Five systems")
+    return words[runs] if runs < len(words) else f"{runs} systems"
+
+
+def _subtitle(speech: Speech, samples: int, seed: int) -> str:
+    motions = "one motion" if samples == 1 else f"{samples} motions"
+    # Short enough for one line on a phone.
+    if speech.truth is None:
+        return f"{motions} of each, seed {seed}; this speech has no true talker"
+    return f"{motions} of each, seed {seed}; the talker's own is one of many"
