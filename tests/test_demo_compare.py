@@ -30,7 +30,8 @@ def test_compare_shows_every_system_and_the_talker(tmp_path):
     assert main(["demo", "--compare", "--samples", "1", "--seed", "3", "--formats", "bvh,html", "--out", str(out)]) == 0
     data = page_data(out)
     assert [figure["label"] for figure in data["figures"]] == ["talker", *SHIPPED]
-    assert data["words"] and data["figures"][0]["tracks"]
+    assert data["words"]
+    assert data["figures"][0]["tracks"]
     recording, _ = demo_recording()
     truth = read_bvh(out / "talker_00.bvh")
     assert np.abs(truth.positions() - recording.motion.positions()).max() < 1e-3
@@ -51,16 +52,16 @@ def test_runs_of_ones_own_are_compared_too(tmp_path, toy_run_config, toy_corpus,
     train(toy_run_config(steps=2), toy_corpus, tmp_path / "mine", resume=False, progress=False)
     found = comparison.systems([str(tmp_path / "mine"), "demo"])
     assert list(found) == [*SHIPPED, "mine"]
-    toys = {name: found["mine"] for name in ("one", "two-three")}
+    toys = dict.fromkeys(("one", "two-three"), found["mine"])
     speech = comparison.Speech("speech.wav", lambda _: talk(2.0, 5).audio)
     counts = comparison.compare(toys, speech, tmp_path / "out", samples=2, seed=0, formats=("npz", "html"))
     assert counts == {"npz": 4, "html": 1}
     names = [figure["label"] for figure in page_data(tmp_path / "out")["figures"]]
     assert names == ["one 0", "one 1", "two-three 0", "two-three 1"]
     assert (tmp_path / "out" / "two-three_01.npz").is_file()
-    (tmp_path / "other").mkdir()
-    train(toy_run_config(steps=2), toy_corpus, tmp_path / "other" / "mine", resume=False, progress=False)
-    twice = ["demo", "--compare", str(tmp_path / "mine"), str(tmp_path / "other" / "mine"), "--out", str(tmp_path / "x")]
+    other = tmp_path / "other" / "mine"
+    train(toy_run_config(steps=2), toy_corpus, other, resume=False, progress=False)
+    twice = ["demo", "--compare", str(tmp_path / "mine"), str(other), "--out", str(tmp_path / "x")]
     assert main(twice) == 2
     assert "name 'mine'" in capsys.readouterr().err
 
