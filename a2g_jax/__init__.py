@@ -21,6 +21,7 @@ _EXPORTS = {
     "RunConfig": "a2g_jax.training.run_config",
     "Skeleton": "a2g_jax.geometry.skeleton",
     "Style": "a2g_jax.generation.stylized_flow.style",
+    "check_motion": "a2g_jax.metrics.body.check",
     "demo_run": "a2g_jax.training.run",
     "evaluate": "a2g_jax.evaluation.evaluate",
     "export": "a2g_jax.generation.export",

@@ -22,6 +22,7 @@ from a2g_jax.io.bvh_reader import read_bvh as read_bvh
 from a2g_jax.io.bvh_writer import write_bvh as write_bvh
 from a2g_jax.io.npz import read_motion_npz as read_motion_npz
 from a2g_jax.io.npz import write_motion_npz as write_motion_npz
+from a2g_jax.metrics.body.check import check_motion as check_motion
 from a2g_jax.models.registry import find_model as find_model
 from a2g_jax.recording import Recording as Recording
 from a2g_jax.talker.recordings import resample_motion as resample_motion

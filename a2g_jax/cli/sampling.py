@@ -22,7 +22,7 @@ SAMPLES = 5
 def add_arguments(
     parser: argparse.ArgumentParser, samples: int | None = SAMPLES, default: str = f"default: {SAMPLES}"
 ) -> None:
-    """Add ``--samples``, ``--seed`` and ``--formats``.
+    """Add ``--samples``, ``--seed``, ``--formats`` and ``--strict``.
 
     Args:
         samples: the default of ``--samples``, which ``default`` describes.
@@ -35,6 +35,12 @@ def add_arguments(
         type=formats(known),
         default=",".join(known),
         help=f"any of {', '.join(known)}, comma-separated (default: all)",
+    )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="an error, and no files, if a motion stays outside the bounds of a body after three more draws"
+        " (default: it is reported, also in checks.json)",
     )
 
 
@@ -59,20 +65,22 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
 def write_samples(
     run: "Run", sampler: "Sampler", audio: Any, options: argparse.Namespace, title: str, **about: Any
 ) -> None:
-    """Generate and write the samples with a progress bar, and print the number of files.
+    """Generate, check and write the samples with a progress bar; print the number of files and the result of the check.
 
     Args:
         audio: (N,), mono, at the run's sample rate.
         title: of the speech, for the page's heading.
         about: further arguments of :func:`~a2g_jax.generation.export.export`.
     """
+    from a2g_jax.generation.checked import Checked
     from a2g_jax.generation.export import export
     from a2g_jax.progress import progress_bar
 
+    checked = Checked(run, sampler, strict=options.strict)
     with progress_bar(options.samples, "generating", "motion") as bar:
         written = export(
             run,
-            sampler,
+            checked,
             audio,
             options.out,
             samples=options.samples,
@@ -83,6 +91,8 @@ def write_samples(
             **about,
         )
     print_written(options.out, written)
+    for line in checked.lines():
+        print(line)
 
 
 def print_written(out: str, written: dict[str, int]) -> None:

@@ -1,19 +1,23 @@
 """Generated motions as files, and a page that plays them."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.words import Word
+from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
 
 #: Reports of an earlier call, which belong to other motions.
-_REPORTS = r"pins\.json"
+_REPORTS = r"(pins|checks)\.json"
 
 
 def export(
@@ -31,10 +35,14 @@ def export(
     lanes: Sequence[Track] = (),
     report: Callable[[int], None] = lambda done: None,
 ) -> dict[str, int]:
-    """Generate and write ``sample_00.bvh``, ``sample_00.npz``, ... and ``index.html``.
+    """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
+
+    Every motion is checked, and drawn again where a body could not do it: see
+    :class:`~a2g_jax.generation.checked.Checked`. ``checks.json`` has the bounds, and the findings on each sample.
 
     Args:
         run: the sampler's.
+        sampler: a ``Checked`` one is used as it is; with ``strict``, nothing is written before all samples are good.
         audio: mono, at the run's sample rate.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
@@ -46,16 +54,23 @@ def export(
         How many files of each format were written.
 
     Raises:
-        InputError: a folder that cannot be used, audio shorter than a frame, or too large a page.
+        InputError: a folder that cannot be used, audio shorter than a frame, too large a page, or a motion that is
+            refused.
     """
     if PAGE in formats:
         check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
+    checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
+    motions: Iterable[Motion] = checked.stream(audio, samples, seed)
+    if checked.strict:
+        make_folder(out)  # a folder that cannot be used is refused before any work
+        motions = list(motions)
     files, figures = MotionFiles(out, "sample", formats, _REPORTS), []
-    for number, motion in enumerate(sampler.stream(audio, samples, seed)):
+    for number, motion in enumerate(motions):
         files.write(number, motion)
         if PAGE in formats:
-            figures.append(Figure(motion=motion, label=f"sample {number}"))
+            figures.append(checked_figure(motion, number, checked.reports[number].findings))
         report(number + 1)
+    write_json(files.folder / "checks.json", checked.to_json())
     if figures:
         write_page(
             files.folder / "index.html",
@@ -69,3 +84,15 @@ def export(
             lanes=lanes,
         )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
+
+
+def checked_figure(motion: Motion, number: int, findings: Sequence[BodyFinding]) -> Figure:
+    """A sample on the page, with the worst finding under it and a lane of all of them."""
+    if not findings:
+        return Figure(motion=motion, label=f"sample {number}")
+    spans = tuple(
+        (one.first / motion.fps, one.stop / motion.fps, str(one), "#c0392b")
+        for one in sorted(findings, key=lambda one: one.first)
+    )
+    note = f"outside the bounds of a body at {findings[0]}"
+    return Figure(motion=motion, label=f"sample {number}", note=note, tracks=(Track("outside bounds", spans),))

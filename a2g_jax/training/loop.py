@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model
+from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
@@ -78,6 +80,7 @@ def train(
         state = restored
         config = keep_sampling(config, out)
     done = int(state.step)
+    config = replace(config, body_extremes=corpus_extremes(corpus))
     export = partial(_export, config, model, corpus, out)
     make_folder(out)
     sweep_unfinished(checkpoints.folder)

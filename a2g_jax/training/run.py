@@ -16,6 +16,7 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import atomic_path, sha256_file, write_json
+from a2g_jax.metrics.body.bounds import extremes_from_json, extremes_to_json
 from a2g_jax.models.base import Model, Params
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.models.train_config import TrainConfig
@@ -68,6 +69,7 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         **body_to_json(config.space.body),
         "corpus": config.corpus,
         "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
+        "body_extremes": None if config.body_extremes is None else extremes_to_json(config.body_extremes),
     }
 
 
@@ -109,6 +111,10 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             corpus=values["corpus"],
             perceptual=Perceptual(values["feature_network"]) if values.get("feature_network") else None,
         )
+        if values.get("body_extremes") is not None:
+            where = f"{about}: body_extremes"
+            found = extremes_from_json(values["body_extremes"], config.body_reference, where)
+            config = replace(config, body_extremes=found)
         steps = int(values["steps"])
     except InputError:
         raise

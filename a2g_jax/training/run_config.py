@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
+import numpy as np
 from jaxtyping import Array, Float
 
 from a2g_jax.data.corpus import Corpus
@@ -12,6 +14,8 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
+from a2g_jax.metrics.body.bounds import BodyBounds, Values, bounds_of
+from a2g_jax.metrics.body.figures import Reference
 from a2g_jax.models.base import Data, Model, Params, Summary
 from a2g_jax.models.entry import Entry
 from a2g_jax.models.registry import find_model
@@ -49,6 +53,8 @@ class RunConfig:
     """The feature network of a perceptual loss."""
     sampling: Any = None
     """Sampling settings; None for those of the preset."""
+    body_extremes: Values | None = None
+    """Extremes of the training split's motion (:func:`~a2g_jax.metrics.body.bounds.extremes`); None if not measured."""
 
     @property
     def entry(self) -> Entry:
@@ -73,6 +79,25 @@ class RunConfig:
                 " a corpus of rotations (a2g prepare --pose 6d), or score it with 'a2g evaluate'."
             )
         return self.space.skeleton
+
+    @cached_property
+    def body_bounds(self) -> BodyBounds:
+        """Bounds of generated motion: those of the training split with margins; of any person if not measured.
+
+        Raises:
+            InputError: the model generates keypoints or directions.
+        """
+        return bounds_of(self.body_reference, self.body_extremes)
+
+    @property
+    def body_reference(self) -> Reference:
+        """The mean pose of the training split, and the mean height of its root.
+
+        Raises:
+            InputError: the model generates keypoints or directions.
+        """
+        pose, root = self.statistics["pose"].mean, self.statistics["root"].mean
+        return Reference(self.skeleton, np.asarray(self.space.mean_rotations(pose), np.float64), float(root[1]))
 
     @classmethod
     def of(

@@ -107,6 +107,11 @@ class Styled:
     style: Style | None
     seed_poses: Motion | None
 
+    @property
+    def varies(self) -> bool:
+        """Whether another seed gives another motion: not if the latents of the style replace all drawn ones."""
+        return self.style is None or self.style.share < 1.0 or self.style.mode != "repeat"
+
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
         yield from self.space.stream(audio, samples, seed, self.style, self.seed_poses)

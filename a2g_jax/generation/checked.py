@@ -1,0 +1,170 @@
+"""Generation that checks every motion, and draws it again where a body could not do it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.errors import InputError
+from a2g_jax.generation.generator import Audio, Sampler
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.metrics.body.bounds import BodyBounds
+from a2g_jax.metrics.body.check import BodyFinding, Stretch, check_motion, frames_outside
+from a2g_jax.training.run import Run
+
+#: Draws in place of a bad one. If a fifth of the samples is bad, one in 600 is still bad after three more.
+REDRAWS = 3
+
+
+@dataclass(frozen=True)
+class SampleReport:
+    """The check of one sample."""
+
+    sample: int
+    draws: int
+    """1 for a sample that was good at once."""
+    findings: tuple[BodyFinding, ...]
+    """On the motion that was kept; none if it is good."""
+    before: tuple[BodyFinding, ...] = ()
+    """On the first draw, where another one was kept."""
+
+    def lines(self) -> list[str]:
+        """What a person wants to know: nothing on a sample that was good at once."""
+        if self.findings:
+            worst, more = self.findings[0], len(self.findings) - 1
+            rest = f", and {more} more" if more else ""
+            return [f"sample {self.sample}: OUTSIDE THE BOUNDS OF A BODY after {_times(self.draws)}: {worst}{rest}"]
+        if self.before:
+            return [f"sample {self.sample}: good after {_times(self.draws)}; the first had: {self.before[0]}"]
+        return []
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON values."""
+        return {
+            "sample": self.sample,
+            "draws": self.draws,
+            "findings": [finding.to_json() for finding in self.findings],
+            "first_draw": [finding.to_json() for finding in self.before],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """A sampler whose motions are checked against the bounds of the run's training motion.
+
+    A bad sample is drawn again, up to :data:`REDRAWS` times, and the draw with the fewest frames outside is kept. A
+    good sample is the wrapped sampler's own, bit for bit; sample k depends on the audio, the run, the seed and k alone.
+
+    The wrapped sampler may have these attributes: ``stretches``, frames with bounds of their own
+    (:class:`~a2g_jax.metrics.body.check.Stretch`), such as those of pinned clips; ``varies``, false if another seed
+    gives the same motion; ``reports``, a list with an entry for each sample of the current stream, in which the entry
+    of a sample that was drawn again is replaced.
+    """
+
+    run: Run
+    sampler: Sampler
+    strict: bool = False
+    """Whether a sample that stays bad is an error."""
+    reports: list[SampleReport] = field(default_factory=list)
+    """Reports on the samples of :meth:`stream` so far."""
+
+    @property
+    def bounds(self) -> BodyBounds:
+        """Bounds of the run."""
+        return self.run.config.body_bounds
+
+    @property
+    def stretches(self) -> Sequence[Stretch]:
+        """Frames with other bounds."""
+        return tuple(getattr(self.sampler, "stretches", ()))
+
+    def stream(self, audio: Audio, samples: int, seed: int = 0) -> Iterator[Motion]:
+        """Yield checked motions.
+
+        Raises:
+            InputError: a motion holds NaN after all draws, or with ``strict``, is outside the bounds.
+        """
+        self.reports.clear()
+        for sample, motion in enumerate(self.sampler.stream(audio, samples, seed)):
+            kept, report = self._check(audio, seed, sample, motion)
+            self.reports.append(report)
+            if report.findings and (self.strict or report.findings[0].figure == "finite"):
+                raise InputError(
+                    f"sample {sample}: a body cannot do it, after {_times(report.draws)}: {report.findings[0]}; use"
+                    f" another --seed or speech{', or leave --strict out' if self.strict else ''}."
+                )
+            yield kept
+
+    def to_json(self) -> dict[str, Any]:
+        """Bounds, and the reports so far."""
+        return {
+            "format": "a2g_jax checks",
+            "source": self.bounds.source,
+            "fps": self.run.config.fps,
+            "bounds": self.bounds.to_json(),
+            "stretches": [
+                {"first": one.first, "stop": one.stop, "source": one.bounds.source, "bounds": one.bounds.to_json()}
+                for one in self.stretches
+            ],
+            "samples": [report.to_json() for report in self.reports],
+        }
+
+    def lines(self) -> list[str]:
+        """Summary of the reports for the terminal."""
+        good = sum(not report.findings for report in self.reports)
+        again = sum(report.draws > 1 for report in self.reports)
+        drawn = f", {again} drawn again" if again else ""
+        first = f"checked: {good} of {len(self.reports)} within the bounds of {self.bounds.source}{drawn}"
+        return [first, *(line for report in self.reports for line in report.lines())]
+
+    def _check(self, audio: Audio, seed: int, sample: int, motion: Motion) -> tuple[Motion, SampleReport]:
+        best = first = check_motion(motion, self.bounds, self.stretches)
+        kept, draws = motion, 1
+        while best and draws <= REDRAWS and self._helps(best):
+            again, entry = self._again(audio, redrawn_seed(seed, sample, draws))
+            draws += 1
+            if _same(again, motion):
+                break
+            found = check_motion(again, self.bounds, self.stretches)
+            if _badness(found, again) < _badness(best, kept):
+                best, kept = found, again
+                if entry is not None:
+                    self.sampler.reports[sample] = entry  # type: ignore[attr-defined]
+        return kept, SampleReport(sample, draws, best, first if kept is not motion else ())
+
+    def _helps(self, findings: Sequence[BodyFinding]) -> bool:
+        """Whether another draw can help: the motion of a pinned clip is the same in each."""
+        if not getattr(self.sampler, "varies", True):
+            return False
+        spans = [(one.first, one.stop) for one in self.stretches]
+        return not all(any(first <= one.first and one.stop <= stop for first, stop in spans) for one in findings)
+
+    def _again(self, audio: Audio, seed: int) -> tuple[Motion, Any]:
+        """Another draw, and the wrapped sampler's report on it; its list of reports stays as it is."""
+        reports = getattr(self.sampler, "reports", None)
+        before = None if reports is None else list(reports)
+        (motion,) = self.sampler.stream(audio, 1, seed)
+        if reports is None:
+            return motion, None
+        entry = reports[0] if reports else None
+        reports[:] = before or []
+        return motion, entry
+
+
+def redrawn_seed(seed: int, sample: int, attempt: int) -> int:
+    """Seed of another draw of a sample: a hash of seed, sample and number of the attempt, from 0 to 2**31 - 1."""
+    return int(np.random.SeedSequence([seed, sample, attempt]).generate_state(1)[0] >> 1)
+
+
+def _badness(findings: Sequence[BodyFinding], motion: Motion) -> tuple[bool, int]:
+    """NaN is worst, then the number of frames outside."""
+    return any(one.figure == "finite" for one in findings), frames_outside(findings, motion.frames)
+
+
+def _same(one: Motion, other: Motion) -> bool:
+    return np.array_equal(one.rotations, other.rotations) and np.array_equal(one.root, other.root)
+
+
+def _times(draws: int) -> str:
+    return "1 draw" if draws == 1 else f"{draws} draws"

@@ -1,0 +1,191 @@
+"""Bad samples are drawn again, then reported; good ones stay bit for bit."""
+
+import json
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from a2g_jax.cli import main
+from a2g_jax.errors import InputError
+from a2g_jax.generation.checked import REDRAWS, Checked, redrawn_seed
+from a2g_jax.generation.export import export
+from a2g_jax.io.audio import write_audio
+from a2g_jax.metrics.body.check import Stretch, check_motion
+from a2g_jax.talker.recordings import talk
+from a2g_jax.training.body_extremes import corpus_extremes
+from a2g_jax.training.run import Run, load_run, save_run
+
+SPEECH = talk(6.0, 21).audio
+SOUND = talk(6.0, 21).motion
+
+
+@pytest.fixture(scope="module")
+def run(toy_run_config, toy_corpus):
+    """A run without weights: the samplers here draw by themselves."""
+    return Run(replace(toy_run_config(), body_extremes=corpus_extremes(toy_corpus)), {}, {}, 0)
+
+
+def broken(motion, frame=60, joint="L_Elbow"):
+    rotations = np.array(motion.rotations)
+    rotations[frame, motion.skeleton.names.index(joint)] = np.diag([-1.0, 1.0, -1.0])
+    return replace(motion, rotations=rotations)
+
+
+@dataclass
+class Scripted:
+    """A sampler whose draws are bad where the script tells so; each has its seed and sample in the root's place."""
+
+    bad: object
+    """Whether the draw of a seed and a sample is bad."""
+    drawn: list = field(default_factory=list)
+    reports: list = field(default_factory=list)
+    ignores_seed: bool = False
+
+    def stream(self, audio, samples, seed=0):
+        self.reports.clear()
+        for sample in range(samples):
+            self.drawn.append((seed, sample))
+            mark = 0 if self.ignores_seed else 1e-4 * (seed % 100) + 1e-6 * sample
+            motion = replace(SOUND, root=SOUND.root + np.float32(mark))
+            self.reports.append((seed, sample))
+            yield broken(motion) if self.bad(seed, sample) else motion
+
+
+def test_good_samples_stay_as_they_are(run):
+    sampler = Scripted(lambda seed, sample: False)
+    checked = Checked(run, sampler)
+    motions = list(checked.stream(SPEECH, 3, 7))
+    for motion, own in zip(motions, Scripted(sampler.bad).stream(SPEECH, 3, 7), strict=True):
+        np.testing.assert_array_equal(motion.root, own.root)
+        np.testing.assert_array_equal(motion.rotations, own.rotations)
+    assert sampler.drawn == [(7, 0), (7, 1), (7, 2)]
+    assert [report.draws for report in checked.reports] == [1, 1, 1]
+    assert checked.lines() == ["checked: 3 of 3 within the bounds of any person"]
+
+
+def test_a_bad_sample_is_drawn_again(run):
+    """Whatever the other samples are: sample k depends on seed and k alone, and so does its report."""
+    bad = lambda seed, sample: (seed, sample) in {(7, 1), (redrawn_seed(7, 1, 1), 0)}  # noqa: E731
+    sampler = Scripted(bad)
+    checked = Checked(run, sampler)
+    motions = list(checked.stream(SPEECH, 4, 7))
+    assert sampler.drawn[2:4] == [(redrawn_seed(7, 1, 1), 0), (redrawn_seed(7, 1, 2), 0)]
+    assert sampler.reports == [(7, 0), (redrawn_seed(7, 1, 2), 0), (7, 2), (7, 3)]
+    assert [report.draws for report in checked.reports] == [1, 3, 1, 1]
+    assert all(check_motion(motion, checked.bounds) == () for motion in motions)
+    assert "sample 1: good after 3 draws; the first had: 2.00 s (frame 60): L_Elbow" in checked.lines()[1]
+    alone = list(Checked(run, Scripted(bad)).stream(SPEECH, 2, 7))
+    for one, other in zip(alone, motions, strict=False):
+        np.testing.assert_array_equal(one.root, other.root)
+
+
+def test_a_sample_that_stays_bad_is_reported(run, tmp_path):
+    sampler = Scripted(lambda seed, sample: sample == 1 or seed != 7)
+    checked = Checked(run, sampler)
+    counts = export(
+        run, checked, SPEECH, tmp_path, samples=2, seed=7, formats=("npz", "html"), title="it", report=lambda done: None
+    )
+    assert counts == {"npz": 2, "html": 1}
+    assert len(sampler.drawn) == 2 + REDRAWS
+    written = json.loads((tmp_path / "checks.json").read_text())
+    assert [row["draws"] for row in written["samples"]] == [1, 1 + REDRAWS]
+    assert written["samples"][0]["findings"] == []
+    worst = written["samples"][1]["findings"][0]
+    assert (worst["joint"], worst["first"]) == ("L_Elbow", 60)
+    assert worst["value"] > worst["bound"] == written["bounds"][worst["figure"]]["L_Elbow"]
+    assert "sample 1: OUTSIDE THE BOUNDS OF A BODY after 4 draws" in "".join(checked.lines())
+    assert "outside the bounds of a body at 2.0" in (tmp_path / "index.html").read_text()
+
+
+def test_strict_leaves_nothing(run, tmp_path):
+    """The error names sample, time, joint and figure; files of an earlier call stay."""
+    sampler = Scripted(lambda seed, sample: sample == 1 or seed != 7)
+    (tmp_path / "sample_00.npz").write_bytes(b"earlier")
+    with pytest.raises(InputError, match=r"sample 1: .* after 4 draws: 2\.0\d s \(frame 6\d\): L_Elbow .* --strict"):
+        export(run, Checked(run, sampler, strict=True), SPEECH, tmp_path, samples=3, seed=7, formats=("npz",), title="")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"sample_00.npz": b"earlier"}
+    good = Checked(run, Scripted(lambda seed, sample: False), strict=True)
+    export(run, good, SPEECH, tmp_path, samples=1, seed=7, formats=("npz",), title="")
+    assert {path.name for path in tmp_path.iterdir()} == {"sample_00.npz", "checks.json"}
+
+
+def test_no_draws_where_they_change_nothing(run):
+    fixed = Scripted(lambda seed, sample: True)
+    fixed.varies = False
+    (report,) = _reports(run, fixed)
+    assert (report.draws, len(fixed.drawn)) == (1, 1)
+    same = Scripted(lambda seed, sample: True, ignores_seed=True)
+    (report,) = _reports(run, same)
+    assert (report.draws, len(same.drawn)) == (2, 2)
+    assert report.findings
+    clip = Scripted(lambda seed, sample: True)
+    clip.stretches = (Stretch(50, 70, run.config.body_bounds),)
+    (report,) = _reports(run, clip)
+    assert (report.draws, len(clip.drawn)) == (1, 1)
+    clip.stretches = (Stretch(50, 60, run.config.body_bounds),)
+    (report,) = _reports(run, clip)
+    assert report.draws == 1 + REDRAWS
+
+
+def _reports(run, sampler):
+    checked = Checked(run, sampler)
+    list(checked.stream(SPEECH, 1, 0))
+    return checked.reports
+
+
+def test_nan_is_never_written(run, tmp_path):
+    class Broken:
+        def stream(self, audio, samples, seed=0):
+            yield replace(SOUND, root=np.full_like(SOUND.root, np.nan))
+
+    with pytest.raises(InputError, match="sample 0: .*Pelvis is not a number; use another --seed or speech."):
+        export(run, Broken(), SPEECH, tmp_path, samples=1, seed=0, formats=("npz",), title="")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_seeds_of_draws_are_distinct():
+    seeds = {redrawn_seed(seed, sample, attempt) for seed in range(20) for sample in range(20) for attempt in (1, 2, 3)}
+    assert len(seeds) == 1200
+    assert all(0 <= seed < 2**31 for seed in seeds)
+    assert redrawn_seed(3, 1, 2) == redrawn_seed(3, 1, 2)
+
+
+def test_extremes_in_a_run(toy_run_config, toy_corpus, tmp_path, monkeypatch):
+    """They are measured with a minute of training motion, and survive the run's folder."""
+    assert corpus_extremes(toy_corpus) is None
+    monkeypatch.setattr("a2g_jax.training.body_extremes.LEAST_FRAMES", 100)
+    found = corpus_extremes(toy_corpus)
+    config = replace(toy_run_config(), body_extremes=found)
+    import jax
+
+    params = jax.device_get(jax.jit(config.build().init)(jax.random.key(0)))
+    save_run(tmp_path, Run(config, params, {}, 0))
+    again = load_run(tmp_path).config.body_bounds
+    assert again.source == "the training split with margins"
+    for name, values in config.body_bounds.high.items():
+        np.testing.assert_allclose(again.high[name], values, rtol=1e-5)
+    about = json.loads((tmp_path / "run.json").read_text())
+    del about["body_extremes"]
+    (tmp_path / "run.json").write_text(json.dumps(about))
+    assert load_run(tmp_path).config.body_bounds.source == "any person"
+    (tmp_path / "run.json").write_text(json.dumps(about | {"body_extremes": {"turn": [1.0]}}))
+    with pytest.raises(InputError, match=r"run.json: body_extremes: is damaged"):
+        load_run(tmp_path)
+
+
+def test_the_command_line(tmp_path, capsys, monkeypatch):
+    write_audio(tmp_path / "speech.wav", SPEECH, 16000)
+    command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "2", "--formats", "npz"]
+    assert main([*command, "--out", str(tmp_path / "out"), "--strict"]) == 0
+    assert "checked: 2 of 2 within the bounds of" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "checks.json").read_text())["samples"][1]["draws"] == 1
+    from a2g_jax.generation.generator import Generator
+
+    own = Generator.stream
+    monkeypatch.setattr(Generator, "stream", lambda *args, **given: map(broken, own(*args, **given)))
+    assert main([*command, "--out", str(tmp_path / "bad")]) == 0
+    assert "sample 0: OUTSIDE THE BOUNDS OF A BODY after 4 draws: 2.0" in capsys.readouterr().out
+    assert main([*command, "--out", str(tmp_path / "worse"), "--strict"]) == 2
+    assert "L_Elbow" in capsys.readouterr().err
+    assert list((tmp_path / "worse").iterdir()) == []
