@@ -26,6 +26,8 @@ RANGE = 4.0
 T_POSE = 20.0
 #: Fastest wrist of a clip that counts as standing still, m/s.
 STILL = 0.1
+#: Degrees per second beyond which a joint flips in a recording: 60 degrees between two frames at 30 fps.
+FLIP = 1800.0
 #: Metres between two frames from which the root jumps, at 30 fps.
 JUMP = 0.15
 
@@ -87,8 +89,8 @@ class Bounds:
 
     shortest: float = 0.2
     """Seconds; shorter clips are lost in their transitions."""
-    turn: float | None = 1800.0
-    """Degrees per second: 60 degrees between two frames at 30 fps. Beyond lie flips of a capture, not gestures."""
+    turn: float | None = FLIP
+    """Degrees per second."""
     wrist_speed: float | None = 10.0
     """m/s; that of a punch."""
     tilt: float | None = 75.0
@@ -195,6 +197,17 @@ def t_pose_frames(motion: Motion) -> Bool[np.ndarray, " T"]:
         for start, end in ((f"{side}_Shoulder", f"{side}_Elbow"), (f"{side}_Elbow", f"{side}_Wrist")):
             found &= angle_between(part[end] - part[start], sign * across) < T_POSE
     return found
+
+
+def leading_t_pose(motion: Motion) -> int:
+    """Number of frames of a T-pose that a motion begins with and jumps out of; 0 if it leaves it as people do."""
+    held = t_pose_frames(motion)
+    frames = motion.frames if held.all() else int(np.argmin(held))
+    if frames in (0, motion.frames):
+        return 0
+    rotations = np.asarray(motion.rotations)
+    leaves = rotation_angle(rotations[frames], rotations[frames - 1]).max() * motion.fps
+    return frames if leaves > FLIP else 0
 
 
 _T_JOINTS = tuple(f"{side}_{joint}" for side in "LR" for joint in ("Shoulder", "Elbow", "Wrist"))
