@@ -18,6 +18,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.retarget.poses import angle_between, rotation_angle
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.metrics.hands import hand_jerk, hand_speeds
 
 #: Standard deviations from the mean beyond which a value lies outside the training range; held-out talk has 0.1 % of
 #: its values there.
@@ -52,6 +53,8 @@ class ClipFit:
     """Fastest wrist relative to the root, m/s."""
     wrist_speed_p99: float
     """99th percentile of the faster wrist's speed over frames, m/s."""
+    jerk_p99: float
+    """99th percentile of the jerk of the hand with more of it, m/s3; 300 to 1000 in recordings of talk."""
     tilt: Worst
     """Largest angle between the trunk (pelvis to neck) and the vertical, degrees."""
     t_pose_share: float
@@ -116,7 +119,7 @@ def measure_clip(motion: Motion, space: PoseSpace, statistics: Statistics) -> Cl
     places = motion.positions()
     root = places[:, 0].astype(np.float64)
     local = places - places[:, :1]
-    wrists = [names.index(names[body[BODY_JOINTS.index(f"{side}_Wrist")]]) for side in "LR"] if body else []
+    wrists = [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"] if body else []
     speeds = np.linalg.norm(np.diff(local[:, wrists], axis=0), axis=-1) * fps
     scores = np.asarray(statistics.normalise(np.asarray(space.from_rotations(jnp.asarray(rotations)))))
     mean = np.asarray(space.mean_rotations(statistics.mean))
@@ -127,7 +130,8 @@ def measure_clip(motion: Motion, space: PoseSpace, statistics: Statistics) -> Cl
         fps=fps,
         turn=_worst(turns, names),
         wrist_speed=_worst(speeds, [names[joint] for joint in wrists]),
-        wrist_speed_p99=float(np.percentile(speeds.max(axis=1), 99.0)) if speeds.size else 0.0,
+        wrist_speed_p99=_percentile(hand_speeds(local, motion.skeleton, fps)),
+        jerk_p99=_percentile(hand_jerk(local, motion.skeleton, fps)),
         tilt=_worst(_tilt(local, body)[:, None], ["trunk"]),
         t_pose_share=float(np.mean(t_pose_frames(motion))),
         beyond_share=float(np.mean(np.abs(scores) > RANGE)),
@@ -218,6 +222,10 @@ _ANIMAL = ("tail", "paw", "hoof", "wing")
 def animal_joints(skeleton: Skeleton) -> list[str]:
     """Names of joints that people do not have, such as tails, as far as names show it."""
     return [name for name in skeleton.names if any(word in name.lower() for word in _ANIMAL)]
+
+
+def _percentile(values: Float[np.ndarray, " t"]) -> float:
+    return float(np.percentile(values, 99.0)) if len(values) else 0.0
 
 
 def _exceeds(value: float, bound: float | None) -> bool:

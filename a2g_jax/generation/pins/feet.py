@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.geometry.footholds import Goal, Leg, find_legs, steps
@@ -14,6 +15,8 @@ from a2g_jax.geometry.retarget.poses import rotation_angle, world_rotations
 _TWIST = 35.0
 #: Share of a transition that each foot takes for a step, and metres that it is lifted for a step of ten centimetres.
 _STEP, _LIFT = 0.6, 0.05
+#: Width of the Gaussian for the height of a stepping body, seconds.
+_SMOOTHING = 0.07
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,13 @@ def steps_itself(clip: Feet, plain: Feet, fps: float) -> bool:
     if any(steps(path, fps).any() for path in clip.places):
         return True
     return bool(np.median(rotation_angle(clip.world, plain.world), axis=1).max() > _TWIST)
+
+
+def lifted(clip: Feet, plain: Feet, fps: float) -> Float[np.ndarray, " n"]:
+    """Metres by which a clip has to be higher for its lower ankle not to be below those of the motion around it."""
+    depth = np.maximum(plain.places[:, :, 1].mean() - clip.places[:, :, 1].min(axis=0), 0.0)
+    smooth: Float[np.ndarray, " n"] = gaussian_filter1d(depth, _SMOOTHING * fps, mode="nearest")
+    return smooth
 
 
 def share_of_clip(before: int, inside: int, after: int, leg: int, ends: tuple[bool, bool]) -> Float[np.ndarray, " n"]:

@@ -68,10 +68,8 @@ def decay(near: Float[np.ndarray, "k *d"], shape: Shape) -> Float[np.ndarray, "n
     u = np.minimum(time / settle, 1.0)
     moves = settle * (u - u**3 * (6.0 - 8.0 * u + 3.0 * u**2))
     bends = settle**2 * 0.5 * (u**2 - u**3 * (3.0 - 3.0 * u + u**2))
-    offset: Float[np.ndarray, n * d] = (
-        np.multiply.outer(stays, place) + np.multiply.outer(moves, velocity) + np.multiply.outer(bends, acceleration)
-    )
-    return offset
+    terms = ((stays, place), (moves, velocity), (bends, acceleration))
+    return np.asarray(sum(np.multiply.outer(share, value) for share, value in terms))
 
 
 def turned(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from a2g_jax.generation.pins.feet import Feet, feet_of, share_of_clip, step_over, steps_itself
+from a2g_jax.generation.pins.feet import Feet, feet_of, lifted, share_of_clip, step_over, steps_itself
 from a2g_jax.generation.pins.offsets import turned
 from a2g_jax.generation.pins.report import ROUGH_SPEED, Ends
 from a2g_jax.generation.pins.request import Pin
@@ -98,9 +98,11 @@ def _place(
         clip_feet, there = feet_of(clip), Feet(feet.legs, feet.places[:, inside], feet.world[:, inside])
         assert clip_feet is not None
         shift = (there.middle() - clip_feet.middle()) * [1.0, 0.0, 1.0]
-        clip = replace(clip, root=(np.asarray(clip.root, np.float64) + shift).astype(np.float32))
         if steps_itself(clip_feet, there, plain.fps):
+            # Roots keep the middle between the ankles at one height, so that a lifted foot sinks the other.
+            shift = shift + lifted(clip_feet, there, plain.fps)[:, None] * [0.0, 1.0, 0.0]
             own = replace(clip_feet, places=clip_feet.places + shift)
+        clip = replace(clip, root=(np.asarray(clip.root, np.float64) + shift).astype(np.float32))
     top = hand_speeds(local_places(clip), clip.skeleton, clip.fps).max(initial=0.0)
     limits = Limits(jerk, ROUGH_SPEED * max(float(top), _CALM))
     left = pins[number - 1].stop if number > 0 else 0

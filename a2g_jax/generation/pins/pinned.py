@@ -137,6 +137,6 @@ def check_gaps(pins: Sequence[Pin]) -> None:
             gap = after.start - before.stop / before.motion.fps
             raise InputError(
                 f"--pin {after.name}@{after.start:g}: begins {gap:.2f} s after {before.name} ends, with hands"
-                f" {100 * way:.0f} cm and joints up to {turn:.0f} degrees elsewhere; leave {needed:.2f} s or more between"
-                " them."
+                f" {100 * way:.0f} cm and joints up to {turn:.0f} degrees elsewhere; leave {needed:.2f} s or more"
+                " between them."
             )

@@ -69,7 +69,9 @@ def report_pins(
         within 5 cm on average and 10 cm always); ``before``, ``after`` (s, lengths of the transitions), ``seam_jerk``
         (m/s3, the largest in the transitions; 0 for a clip that fills the whole motion), ``jerk_limit``,
         ``jerk_limit_source``, ``smooth`` (below the limit), ``top_speed`` of the clip's hands and ``speed`` of those in
-        clip and transitions (m/s), ``rough``.
+        clip and transitions (m/s), ``unpinned_seam_jerk`` and ``unpinned_speed`` of the same sample without the pin,
+        ``rough`` (jerk above 1.5 times the largest of the limit, of the clip's and of the unpinned sample's there, or
+        speed above 1.5 times the largest of the clip's, of the unpinned sample's there, and of 1.5 m/s).
     """
     fps, skeleton = pinned.fps, pinned.skeleton
     ours, without = local_places(pinned), local_places(plain)
@@ -121,6 +123,8 @@ def report_pins(
                 "smooth": seam < limit,
                 "top_speed": top,
                 "speed": speed,
+                "unpinned_seam_jerk": own,
+                "unpinned_speed": own_speed,
                 "rough": seam > ROUGH_JERK * max(limit, clip_jerk, own)
                 or speed > ROUGH_SPEED * max(top, own_speed, ORDINARY_SPEED),
             }

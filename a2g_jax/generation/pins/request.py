@@ -20,6 +20,8 @@ from a2g_jax.training.run import Run
 _FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 #: Metres of a root's path from which its loss is reported.
 _TRAVEL = 0.3
+#: Jerk of hands that shake, m/s3: twice that of the liveliest talk.
+_SHAKY = 2500.0
 
 
 class Pin(NamedTuple):
@@ -107,8 +109,8 @@ def pin_of(
     source, notes = motion.skeleton, []
     motion = on_skeleton(motion, config.skeleton, motion.fps, name)
     if calibration := leading_t_pose(motion):
+        notes.append(f"its first {calibration / motion.fps:.2f} s, a T-pose for calibration, are left out")
         motion = motion.clip(calibration, motion.frames)
-        notes.append(f"the first {calibration} frames, a T-pose for calibration, are left out")
     frames = round(motion.seconds * config.fps)
     if length is not None:
         frames = round(length * config.fps)
@@ -129,6 +131,8 @@ def pin_of(
         raise InputError(f"{text}: {' It also '.join(reasons)}")
     if fit.travel > _TRAVEL:
         notes.append(f"its path of {fit.travel:.1f} m along the floor is not kept: the body stays where it stands")
+    if fit.jerk_p99 > _SHAKY:
+        notes.append(f"its own hands shake (99th percentile of jerk {fit.jerk_p99:.0f} m/s3): filter it at the source")
     return Pin(name, start, motion, turned, tuple(notes), fit)
 
 
