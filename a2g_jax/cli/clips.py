@@ -11,14 +11,17 @@ from a2g_jax.cli.paths import existing_corpus, existing_file
 from a2g_jax.errors import InputError
 
 if TYPE_CHECKING:
+    from a2g_jax.data.corpus import Corpus
+    from a2g_jax.generation.audio2gestures.pinned import Pinned
     from a2g_jax.generation.generator import Sampler
+    from a2g_jax.generation.pins.pinned import PinnedClips
     from a2g_jax.generation.stylized_flow.styled import Clip
     from a2g_jax.training.run import Run
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the flags of pins and styles; their defaults are those of ``Pins`` and ``Styling``."""
-    pin = parser.add_argument_group("clips on the timeline (runs of audio2gestures)")
+    """Add the flags of pins and styles; their defaults are those of ``ClipPins``, ``Pins`` and ``Styling``."""
+    pin = parser.add_argument_group("clips on the timeline")
     pin.add_argument(
         "--pin",
         action="append",
@@ -26,16 +29,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a BVH or NPZ to perform from that second on (its first LENGTH seconds); may be repeated",
     )
     pin.add_argument(
+        "--pin-mode",
+        choices=("clip", "latent"),
+        help="perform the clip itself (default), or decode it from its code, which only runs of audio2gestures have",
+    )
+    pin.add_argument(
         "--pin-blend",
         type=number(float, 0, 10, "a number from 0 to 10"),
         metavar="SECONDS",
-        help="length of the transitions before and after each (default: 0.75)",
+        help="length of the transitions before and after each (default: as short as speed and jerk of the hands allow;"
+        " 0.75 with --pin-mode latent)",
     )
     pin.add_argument(
         "--pin-shared",
         type=share,
         metavar="SHARE",
-        help="weight of the clip's own shared code against the audio's (default: 1; 0 as in the paper)",
+        help="with --pin-mode latent: weight of the clip's own shared code against the audio's (default: 1; 0 as in the"
+        " paper)",
     )
     pin.add_argument(
         "--pin-corpus",
@@ -69,14 +79,18 @@ def check_flags(options: argparse.Namespace) -> None:
         InputError: such a flag.
     """
     if not options.pin:
-        _refuse(options, ("pin_blend", "pin_shared", "pin_corpus"), "--pin; name a clip and a second")
+        _refuse(options, ("pin_mode", "pin_blend", "pin_shared", "pin_corpus"), "--pin; name a clip and a second")
+    if options.pin_mode != "latent":
+        _refuse(options, ("pin_shared",), "--pin-mode latent")
     if options.style is None:
         names = ("style_audio", "style_share", "style_mode", "style_with", "style_with_audio", "style_mix")
         _refuse(options, names, "--style; name a clip")
     if options.style_with is None:
         _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
-    if options.pin and (options.style is not None or options.seed_clip is not None):
-        raise InputError("--pin is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow.")
+    if options.pin_mode == "latent" and (options.style is not None or options.seed_clip is not None):
+        raise InputError(
+            "--pin-mode latent is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow."
+        )
 
 
 def check_files(options: argparse.Namespace) -> None:
@@ -114,32 +128,51 @@ def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
     Raises:
         InputError: a run or clip that cannot be used for it.
     """
-    if options.pin:
-        return _pinned(run, audio, options)
+    if options.pin_mode == "latent":
+        pinned = _in_codes(run, audio, options)
+        return _pinned(pinned, Chosen(pinned))
     if options.style is not None or options.seed_clip is not None:
-        return _styled(run, options)
+        chosen = _styled(run, options)
+    else:
+        from a2g_jax.generation.generator import Generator
 
-    from a2g_jax.generation.generator import Generator
+        chosen = Chosen(Generator(run))
+    return _pinned(_performed(run, audio, options, chosen.sampler), chosen) if options.pin else chosen
 
-    return Chosen(Generator(run))
+
+def _performed(run: "Run", audio: Any, options: argparse.Namespace, sampler: "Sampler") -> "PinnedClips":
+    from a2g_jax.generation.generator import audio_frames
+    from a2g_jax.generation.pins.pinned import ClipPins
+
+    pins = ClipPins(tuple(options.pin), options.pin_blend, _pin_corpus(options))
+    return pins.place(run, sampler, audio_frames(run, audio))
 
 
-def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
-    from a2g_jax.data.corpus import Corpus
-    from a2g_jax.generation.audio2gestures.pin_report import describe
+def _in_codes(run: "Run", audio: Any, options: argparse.Namespace) -> "Pinned":
     from a2g_jax.generation.audio2gestures.pinned import Pins
     from a2g_jax.generation.generator import audio_frames
-    from a2g_jax.io.files import write_json
 
-    corpus = None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
     values = _given({"blend": options.pin_blend, "shared": options.pin_shared})
-    pinned = Pins(tuple(options.pin), corpus=corpus, **values).place(run, audio_frames(run, audio))
+    return Pins(tuple(options.pin), corpus=_pin_corpus(options), **values).place(run, audio_frames(run, audio))
+
+
+def _pin_corpus(options: argparse.Namespace) -> "Corpus | None":
+    from a2g_jax.data.corpus import Corpus
+
+    return None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
+
+
+def _pinned(pinned: "PinnedClips | Pinned", below: Chosen) -> Chosen:
+    """A sampler with pins, whose samples are those of another."""
+    from a2g_jax.generation.pins.report import describe
+    from a2g_jax.io.files import write_json
 
     def report(out: Path) -> list[str]:
         write_json(out / "pins.json", pinned.reports)
-        return [f"sample {number}, {describe(row)}" for number, rows in enumerate(pinned.reports) for row in rows]
+        lines = [f"sample {number}, {describe(row)}" for number, rows in enumerate(pinned.reports) for row in rows]
+        return [*below.report(out), *lines]
 
-    return Chosen(pinned, {"lanes": (pinned.lane(),)}, report)
+    return Chosen(pinned, {**below.about, "lanes": (pinned.lane(),)}, report)
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:

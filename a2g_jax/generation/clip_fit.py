@@ -18,6 +18,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.retarget.poses import angle_between, rotation_angle
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.metrics.hands import hand_jerk, hand_speeds
 
 #: Standard deviations from the mean beyond which a value lies outside the training range; held-out talk has 0.1 % of
 #: its values there.
@@ -26,6 +27,8 @@ RANGE = 4.0
 T_POSE = 20.0
 #: Fastest wrist of a clip that counts as standing still, m/s.
 STILL = 0.1
+#: Degrees per second beyond which a joint flips in a recording: 60 degrees between two frames at 30 fps.
+FLIP = 1800.0
 #: Metres between two frames from which the root jumps, at 30 fps.
 JUMP = 0.15
 
@@ -50,6 +53,8 @@ class ClipFit:
     """Fastest wrist relative to the root, m/s."""
     wrist_speed_p99: float
     """99th percentile of the faster wrist's speed over frames, m/s."""
+    jerk_p99: float
+    """99th percentile of the jerk of the hand with more of it, m/s3; 300 to 1000 in recordings of talk."""
     tilt: Worst
     """Largest angle between the trunk (pelvis to neck) and the vertical, degrees."""
     t_pose_share: float
@@ -87,8 +92,8 @@ class Bounds:
 
     shortest: float = 0.2
     """Seconds; shorter clips are lost in their transitions."""
-    turn: float | None = 1800.0
-    """Degrees per second: 60 degrees between two frames at 30 fps. Beyond lie flips of a capture, not gestures."""
+    turn: float | None = FLIP
+    """Degrees per second."""
     wrist_speed: float | None = 10.0
     """m/s; that of a punch."""
     tilt: float | None = 75.0
@@ -114,7 +119,7 @@ def measure_clip(motion: Motion, space: PoseSpace, statistics: Statistics) -> Cl
     places = motion.positions()
     root = places[:, 0].astype(np.float64)
     local = places - places[:, :1]
-    wrists = [names.index(names[body[BODY_JOINTS.index(f"{side}_Wrist")]]) for side in "LR"] if body else []
+    wrists = [body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"] if body else []
     speeds = np.linalg.norm(np.diff(local[:, wrists], axis=0), axis=-1) * fps
     scores = np.asarray(statistics.normalise(np.asarray(space.from_rotations(jnp.asarray(rotations)))))
     mean = np.asarray(space.mean_rotations(statistics.mean))
@@ -125,7 +130,8 @@ def measure_clip(motion: Motion, space: PoseSpace, statistics: Statistics) -> Cl
         fps=fps,
         turn=_worst(turns, names),
         wrist_speed=_worst(speeds, [names[joint] for joint in wrists]),
-        wrist_speed_p99=float(np.percentile(speeds.max(axis=1), 99.0)) if speeds.size else 0.0,
+        wrist_speed_p99=_percentile(hand_speeds(local, motion.skeleton, fps)),
+        jerk_p99=_percentile(hand_jerk(local, motion.skeleton, fps)),
         tilt=_worst(_tilt(local, body)[:, None], ["trunk"]),
         t_pose_share=float(np.mean(t_pose_frames(motion))),
         beyond_share=float(np.mean(np.abs(scores) > RANGE)),
@@ -197,6 +203,17 @@ def t_pose_frames(motion: Motion) -> Bool[np.ndarray, " T"]:
     return found
 
 
+def leading_t_pose(motion: Motion) -> int:
+    """Number of frames of a T-pose that a motion begins with and jumps out of; 0 if it leaves it as people do."""
+    held = t_pose_frames(motion)
+    frames = motion.frames if held.all() else int(np.argmin(held))
+    if frames in (0, motion.frames):
+        return 0
+    rotations = np.asarray(motion.rotations)
+    leaves = rotation_angle(rotations[frames], rotations[frames - 1]).max() * motion.fps
+    return frames if leaves > FLIP else 0
+
+
 _T_JOINTS = tuple(f"{side}_{joint}" for side in "LR" for joint in ("Shoulder", "Elbow", "Wrist"))
 #: Parts of names of joints that people do not have.
 _ANIMAL = ("tail", "paw", "hoof", "wing")
@@ -205,6 +222,10 @@ _ANIMAL = ("tail", "paw", "hoof", "wing")
 def animal_joints(skeleton: Skeleton) -> list[str]:
     """Names of joints that people do not have, such as tails, as far as names show it."""
     return [name for name in skeleton.names if any(word in name.lower() for word in _ANIMAL)]
+
+
+def _percentile(values: Float[np.ndarray, " t"]) -> float:
+    return float(np.percentile(values, 99.0)) if len(values) else 0.0
 
 
 def _exceeds(value: float, bound: float | None) -> bool:

@@ -15,5 +15,13 @@ def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
     Raises:
         InputError: a file that cannot be read, or a rig that is not recognised.
     """
-    motion = read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
-    return on_skeleton(motion, skeleton, fps, str(path))
+    return on_skeleton(read_motion(path), skeleton, fps, str(path))
+
+
+def read_motion(path: Path) -> Motion:
+    """A motion file on its own rig: a BVH, or an NPZ that this package wrote.
+
+    Raises:
+        InputError: a file that cannot be read.
+    """
+    return read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)

@@ -6,6 +6,7 @@ Hips and knees reach it by two-bone inverse kinematics, and the ankle keeps the 
 moves over to its own path within a fifth of a second.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,23 +44,40 @@ class Leg(NamedTuple):
     toe: int
 
 
+#: Where an ankle goes and how it is turned.
+Goal = tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 3"]]
+
+
 def lock_feet(motion: Motion) -> Motion:
     """The motion with standing feet fixed to footholds; unchanged on skeletons without legs of hip, knee and ankle.
 
     The root is lowered where a leg would be too short for its foothold.
     """
-    legs = _legs(motion)
+    legs = find_legs(motion)
     if not legs or motion.frames < 2:
         return motion
     places = motion.positions().astype(np.float64)
     world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
-    goals = [_goal(places[:, leg.ankle], world[:, leg.ankle], motion.fps) for leg in legs]
+    return reach_goals(motion, {leg: _goal(places[:, leg.ankle], world[:, leg.ankle], motion.fps) for leg in legs})
+
+
+def reach_goals(motion: Motion, goals: Mapping[Leg, Goal], lowering: Float[np.ndarray, " T"] | None = None) -> Motion:
+    """The motion with ankles at their goals, by hips and knees; the root is lowered where a leg would be too short.
+
+    Args:
+        goals: for each leg, where its ankle goes and how it is turned in the world.
+        lowering: share of that lowering in each frame; 1 by default.
+    """
+    places = motion.positions().astype(np.float64)
+    world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
     lower = np.zeros(motion.frames)
-    for leg, (target, _) in zip(legs, goals, strict=True):
+    for leg, (target, _) in goals.items():
         lower = np.maximum(lower, _too_far(places[:, leg.hip], target, _REACH * _length(motion, leg)))
     lower = _smooth_above(lower, motion.fps)
+    if lowering is not None:
+        lower = lower * lowering
     rotations = np.asarray(motion.rotations, np.float64).copy()
-    for leg, (target, orientation) in zip(legs, goals, strict=True):
+    for leg, (target, orientation) in goals.items():
         hip = places[:, leg.hip].copy()
         hip[:, 1] -= lower
         _reach(motion, rotations, world, leg, hip, target, orientation)
@@ -68,7 +86,7 @@ def lock_feet(motion: Motion) -> Motion:
     return replace(motion, rotations=rotations.astype(np.float32), root=root.astype(np.float32))
 
 
-def _legs(motion: Motion) -> list[Leg]:
+def find_legs(motion: Motion) -> list[Leg]:
     """Both legs, where hip, knee and ankle follow one another; else none."""
     body = find_body_joints(motion.skeleton)
     if body is None:
@@ -94,7 +112,7 @@ def _goal(
     place: Float[np.ndarray, "T 3"], world: Float[np.ndarray, "T 3 3"], fps: float
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 3"]]:
     """Where an ankle goes and how it is turned: its foothold while the foot stands, its own path in a step."""
-    stands = ~_steps(place, fps)
+    stands = ~steps(place, fps)
     target, turned, own = place.copy(), np.zeros_like(place), Rotation.from_matrix(world)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
     for first, stop in edges.reshape(-1, 2):
@@ -109,8 +127,8 @@ def _goal(
     return target, (Rotation.from_rotvec(turned) * own).as_matrix()
 
 
-def _steps(place: Float[np.ndarray, "T 3"], fps: float) -> Bool[np.ndarray, " T"]:
-    """Frames in which a foot steps, with the time that the change to a foothold takes."""
+def steps(place: Float[np.ndarray, "T 3"], fps: float) -> Bool[np.ndarray, " T"]:
+    """Frames in which a foot (the path of its ankle) steps, with the time that the change to a foothold takes."""
     speed = np.linalg.norm(np.gradient(gaussian_filter1d(place[:, [0, 2]], _SMOOTHING * fps, axis=0), axis=0), axis=-1)
     moves = (speed * fps > _STEP_SPEED) | (place[:, 1] > np.percentile(place[:, 1], 5) + _STEP_HEIGHT)
     if not moves.any():

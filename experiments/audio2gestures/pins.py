@@ -15,9 +15,11 @@ import numpy as np
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
-from a2g_jax.generation.audio2gestures.pin_report import FOLLOWED, corpus_jerk, report_pins
-from a2g_jax.generation.audio2gestures.pins import Pin, face, pin_codes
+from a2g_jax.generation.audio2gestures.pins import pin_codes
+from a2g_jax.generation.pins.report import Ends, corpus_jerk, report_pins
+from a2g_jax.generation.pins.request import Pin
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import write_json
 from a2g_jax.metrics.intervals import bootstrap_mean
@@ -29,12 +31,15 @@ from experiments.tables.records import results
 SECONDS = 12.0
 #: Seconds of blending, and weight of the clip's own shared code.
 SETTINGS = ((0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (0.75, 0.0))
+#: Share of the unpinned distance below which wrists count in ``wrists_followed``.
+FOLLOWED = 0.5
 ERRORS = ("error_cm", "unpinned_error_cm", "wrist_error_cm", "unpinned_wrist_error_cm")
 
 
 def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, shared: float) -> dict[str, Any]:
     """Errors of pinned and unpinned samples, and jerk at the seams compared with the corpus's 99th percentile."""
     space, limit = LatentSpace(run), corpus_jerk(corpus)
+    ends = Ends(round(blend * run.config.fps), round(blend * run.config.fps))
     facing = np.asarray(matrix_from_6d(np.asarray(run.config.statistics["pose"].mean[0])), np.float64)
     rng = np.random.default_rng(seed)
     rows, unpinned, recorded = [], [], []
@@ -49,10 +54,10 @@ def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, share
         codes = space.from_audio(own.audio, seed, number)
         pinned = space.to_motion(pin_codes(space, codes, [pin], blend=blend, shared=shared))
         plain = space.to_motion(codes)
-        rows += report_pins([pin], pinned, plain, limit, "99th percentile of the corpus", blend)
-        unpinned += report_pins([pin], plain, plain, limit, "", blend)
+        rows += report_pins([pin], pinned, plain, limit, "99th percentile of the corpus", ends)
+        unpinned += report_pins([pin], plain, plain, limit, "", ends)
         # The same measure of recorded motion over an equally long stretch.
-        recorded += report_pins([Pin("", start, clip)], own.motion, own.motion, limit, "", blend)
+        recorded += report_pins([Pin("", start, clip)], own.motion, own.motion, limit, "", ends)
     means = {name: bootstrap_mean(np.array([row[name] for row in rows]), rng)._asdict() for name in ERRORS}
     share = {
         f"{kind}share": np.array([row[f"{kind}error_cm"] / row[f"unpinned_{kind}error_cm"] for row in rows])

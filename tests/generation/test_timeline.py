@@ -1,4 +1,4 @@
-"""Pins: parsing, places, codes, and how closely they are followed."""
+"""Pins: parsing, places, codes (``--pin-mode latent``), and how closely they are followed."""
 
 import json
 from dataclasses import replace
@@ -10,15 +10,9 @@ import pytest
 from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
-from a2g_jax.generation.audio2gestures.pin_report import report_pins
-from a2g_jax.generation.audio2gestures.pins import (
-    Pin,
-    check_pins,
-    parse_pin,
-    pin_codes,
-    pin_weights,
-    read_pin,
-)
+from a2g_jax.generation.audio2gestures.pins import pin_codes, pin_weights
+from a2g_jax.generation.pins.report import Ends, report_pins
+from a2g_jax.generation.pins.request import Pin, check_pins, parse_pin, read_pin
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import face, same_rest
 from a2g_jax.io.audio import write_audio
@@ -112,10 +106,11 @@ def test_a_pin_is_followed_and_the_report_says_what_is_not(clip, speech):
     codes = space.from_audio(speech.audio)
     plain, pin = space.to_motion(codes), Pin("clip", 3.0, clip)
     moved = space.to_motion(pin_codes(space, codes, [pin], shared=1.0))
-    (row,) = report_pins([pin], moved, plain, 1e4, "a test")
+    (row,) = report_pins([pin], moved, plain, 1e4, "a test", Ends(22, 22))
     assert row["error_cm"] < 0.6 * row["unpinned_error_cm"]
     assert row["smooth"]
-    (ignored,) = report_pins([pin], plain, plain, 1.0, "a test")
+    assert row["followed"] == (row["wrist_error_cm"] <= 5.0 and row["wrist_worst_cm"] <= 10.0)
+    (ignored,) = report_pins([pin], plain, plain, 1.0, "a test", Ends(22, 22))
     assert ignored["error_cm"] == ignored["unpinned_error_cm"]
     assert not ignored["followed"]
     assert not ignored["smooth"]
@@ -123,22 +118,20 @@ def test_a_pin_is_followed_and_the_report_says_what_is_not(clip, speech):
 
 def test_another_rig_and_rate_are_brought_to_the_runs(clip, tmp_path):
     write_bvh(tmp_path / "wave.bvh", talk(3.0, 4, fps=60.0, fingers=True).motion)
-    skeleton = demo_run().config.skeleton
-    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1.5", skeleton, 30.0)
+    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1.5", demo_run())
     assert (pin.first, pin.motion.frames, pin.motion.skeleton.joints) == (45, 90, 22)
     write_bvh(tmp_path / "blink.bvh", part(clip, 0, 3))
     with pytest.raises(InputError, match=r"lasts 0\.10 s"):
-        read_pin(f"{tmp_path / 'blink.bvh'}@1.5", skeleton, 30.0)
+        read_pin(f"{tmp_path / 'blink.bvh'}@1.5", demo_run())
 
 
 def test_a_part_of_a_clip(clip, tmp_path):
     write_bvh(tmp_path / "wave.bvh", clip)
-    skeleton = demo_run().config.skeleton
-    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1+0.5", skeleton, 30.0)
+    pin = read_pin(f"{tmp_path / 'wave.bvh'}@1+0.5", demo_run())
     assert pin.motion.frames == 15
-    np.testing.assert_allclose(pin.motion.rotations, clip.rotations[:15], atol=1e-4)
+    np.testing.assert_allclose(pin.motion.rotations[:, 1:], clip.rotations[:15, 1:], atol=1e-4)
     with pytest.raises(InputError, match=r"lasts 2\.00 s; request no more"):
-        read_pin(f"{tmp_path / 'wave.bvh'}@1+2.5", skeleton, 30.0)
+        read_pin(f"{tmp_path / 'wave.bvh'}@1+2.5", demo_run())
 
 
 def test_longer_bones_stay_as_they_are_and_another_rest_pose_is_retargeted(clip):
@@ -180,11 +173,11 @@ def test_a_clip_at_the_beginning_has_one_seam_and_a_wide_blend_is_measured_whole
     for at in (0, 42):
         rough.rotations[at, 3:] = rough.rotations[at + 40, 3:]
     pin = Pin("late", 2.0, part(motion, 0, 60))
-    near, far = (report_pins([pin], rough, rough, 1e4, "", blend)[0]["seam_jerk"] for blend in (0.25, 0.75))
+    near, far = (report_pins([pin], rough, rough, 1e4, "", Ends(n, n))[0]["seam_jerk"] for n in (8, 22))
     assert far > 2.0 * near
     early = Pin("early", 0.0, part(motion, 0, 90))
     whole = Pin("whole", 0.0, motion)
-    (start,), (all_of_it,) = (report_pins([p], rough, rough, 1e4, "") for p in (early, whole))
+    (start,), (all_of_it,) = (report_pins([p], rough, rough, 1e4, "", Ends(8, 8)) for p in (early, whole))
     assert start["seam_jerk"] < far
     assert all_of_it["seam_jerk"] == 0.0
     assert all_of_it["smooth"]
@@ -195,9 +188,8 @@ def test_from_the_command_line(clip, speech, tmp_path, capsys):
     write_bvh(tmp_path / "wave.bvh", clip)
     out = tmp_path / "out"
     command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "2", "--out", str(out)]
-    assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@3"]) == 0
-    told = capsys.readouterr().out
-    assert told.count("cm from the clip") == 2
+    assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@3", "--pin-mode", "latent"]) == 0
+    assert capsys.readouterr().out.count("cm from the clip") == 2
     rows = json.loads((out / "pins.json").read_text())
     assert [len(sample) for sample in rows] == [1, 1]
     assert rows[0][0]["end"] == 5.0

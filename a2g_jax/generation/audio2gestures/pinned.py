@@ -1,18 +1,18 @@
-"""Samples with clips pinned to their timeline, and a report on the pins."""
+"""Samples with clips pinned to their timeline through their codes, and a report on the pins."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
-from a2g_jax.generation.audio2gestures.pin_report import corpus_jerk, local_places, report_pins, wrist_jerk
-from a2g_jax.generation.audio2gestures.pins import Pin, check_pins, pin_codes, read_pin
+from a2g_jax.generation.audio2gestures.pins import pin_codes
+from a2g_jax.generation.pins.pinned import OF_CORPUS, OF_MOTIONS, jerk_limit, own_limit, pin_lane
+from a2g_jax.generation.pins.report import Ends, report_pins
+from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.training.run import Run
 
@@ -44,14 +44,8 @@ class Pins:
             InputError: a run without codes, a clip that cannot be used, one that ends too late, or two that overlap.
         """
         space = LatentSpace(run)
-        config = run.config
-        skeleton = config.skeleton
-        facing = np.asarray(config.space.mean_rotations(config.statistics["pose"].mean)[0], np.float64)
-        pins = [read_pin(text, skeleton, config.fps, facing) for text in self.texts]
-        if self.corpus is not None and not self.corpus.skeleton.same_tree(config.skeleton):
-            raise InputError(f"--pin-corpus {self.corpus.path}: has another skeleton than the run.")
-        limit = None if self.corpus is None else corpus_jerk(self.corpus)
-        return Pinned(self, run, space, tuple(check_pins(pins, frames, config.fps)), limit)
+        pins = check_pins([read_pin(text, run) for text in self.texts], frames, run.config.fps)
+        return Pinned(self, run, space, tuple(pins), jerk_limit(self.corpus, run))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,20 +71,13 @@ class Pinned:
             plain = self.space.to_motion(codes)
             changed = pin_codes(self.space, codes, self.pins, blend=self.request.blend, shared=self.request.shared)
             motion = self.space.to_motion(changed)
-            limit, source = self.limit, "99th percentile of the corpus"
+            limit, source = self.limit, OF_CORPUS
             if limit is None:
-                limit, source = self._own_limit(plain), "99th percentile of the clips and the unpinned sample"
-            self.reports.append(report_pins(self.pins, motion, plain, limit, source, self.request.blend))
+                limit, source = own_limit([plain, *(pin.motion for pin in self.pins)]), OF_MOTIONS
+            blend = round(self.request.blend * motion.fps)
+            self.reports.append(report_pins(self.pins, motion, plain, limit, source, Ends(blend, blend)))
             yield motion
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""
-        from a2g_jax.viz.player import Track
-
-        spans = tuple((pin.start, pin.start + pin.motion.seconds, Path(pin.name).stem, "hold") for pin in self.pins)
-        return Track("pinned", spans)
-
-    def _own_limit(self, plain: Motion) -> float:
-        motions = [plain, *(pin.motion for pin in self.pins if pin.motion.frames > 3)]
-        values = [wrist_jerk(local_places(motion), motion.skeleton, motion.fps) for motion in motions]
-        return float(np.percentile(np.concatenate(values), 99.0))
+        return pin_lane(self.pins)

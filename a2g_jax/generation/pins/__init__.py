@@ -1,0 +1,1 @@
+"""Clips pinned to moments of a generated motion, for runs of any model that moves a skeleton."""
