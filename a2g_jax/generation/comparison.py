@@ -9,11 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.generation.checked import Checked
+from a2g_jax.generation.export import checked_figure
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Generator, audio_frames
 from a2g_jax.generation.talk.page import gesture_lane
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.words import Word
+from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.talker.demo_speech import demo_recording
 from a2g_jax.talker.speech import plan_from_json
 from a2g_jax.training.run import Run, open_run
@@ -112,9 +115,10 @@ def compare(
     # This removes the talker's motion of an earlier speech, also where this one has none.
     written = {name: MotionFiles(out, name, formats) for name in (TALKER, *runs)}
     figures = [] if speech.truth is None else [speech.truth]
-    for name, number, motion in _motions(runs, audio, samples, seed):
+    for name, number, motion, findings in _motions(runs, audio, samples, seed):
         written[name].write(number, motion)
-        figures.append(Figure(motion, f"{name} {number}" if samples > 1 else name, runs[name].config.model))
+        label = f"{name} {number}" if samples > 1 else name
+        figures.append(checked_figure(motion, label, findings, runs[name].config.model))
         report()
     if speech.truth is not None:
         written[TALKER].write(0, speech.truth.motion)
@@ -133,10 +137,11 @@ def compare(
 
 def _motions(
     runs: Mapping[str, Run], audio: Mapping[int, Float[np.ndarray, " N"]], samples: int, seed: int
-) -> Iterator[tuple[str, int, Motion]]:
+) -> Iterator[tuple[str, int, Motion, Sequence[BodyFinding]]]:
     for name, run in runs.items():
-        for number, motion in enumerate(Generator(run).stream(audio[run.config.mel.sample_rate], samples, seed)):
-            yield name, number, motion
+        checked = Checked(run, Generator(run))
+        for number, motion in enumerate(checked.stream(audio[run.config.mel.sample_rate], samples, seed)):
+            yield name, number, motion, checked.reports[number].findings
 
 
 def _count(runs: int) -> str:

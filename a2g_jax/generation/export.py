@@ -68,7 +68,7 @@ def export(
     for number, motion in enumerate(motions):
         files.write(number, motion)
         if PAGE in formats:
-            figures.append(checked_figure(motion, number, checked.reports[number].findings))
+            figures.append(checked_figure(motion, f"sample {number}", checked.reports[number].findings))
         report(number + 1)
     write_json(files.folder / "checks.json", checked.to_json())
     if figures:
@@ -86,13 +86,16 @@ def export(
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def checked_figure(motion: Motion, number: int, findings: Sequence[BodyFinding]) -> Figure:
-    """A sample on the page, with the worst finding under it and a lane of all of them."""
+def checked_figure(motion: Motion, label: str, findings: Sequence[BodyFinding], note: str = "") -> Figure:
+    """A motion on the page; if it is outside the bounds of a body, with the worst finding under it and a lane of all.
+
+    Args:
+        note: under the label of a motion without findings.
+    """
     if not findings:
-        return Figure(motion=motion, label=f"sample {number}")
+        return Figure(motion, label, note)
     spans = tuple(
         (one.first / motion.fps, one.stop / motion.fps, str(one), "#c0392b")
         for one in sorted(findings, key=lambda one: one.first)
     )
-    note = f"outside the bounds of a body at {findings[0]}"
-    return Figure(motion=motion, label=f"sample {number}", note=note, tracks=(Track("outside bounds", spans),))
+    return Figure(motion, label, f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),))

@@ -16,6 +16,7 @@ from a2g_jax.generation.pins.report import corpus_jerk, report_pins
 from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.poses import rotation_angle
+from a2g_jax.metrics.body.check import Stretch
 from a2g_jax.metrics.hands import hand_jerk, hand_joints, local_places
 from a2g_jax.training.run import Run
 
@@ -83,6 +84,12 @@ class PinnedClips:
             motion, placed = perform(plain, self.pins, standing, limit, self.length)
             self.reports.append(report_pins(self.pins, motion, plain, limit, source, [one.ends for one in placed]))
             yield motion
+
+    @property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """The clips, whose own extremes are allowed where they are higher than the bounds of the run."""
+        bounds = self.run.config.body_bounds
+        return tuple(Stretch(pin.first, pin.stop, bounds.loosened(pin.motion, pin.name)) for pin in self.pins)
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""
