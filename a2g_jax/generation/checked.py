@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ class Checked:
         """Bounds of the run."""
         return self.run.config.body_bounds
 
-    @property
+    @cached_property
     def stretches(self) -> Sequence[Stretch]:
         """Frames with other bounds."""
         return tuple(getattr(self.sampler, "stretches", ()))
