@@ -265,7 +265,7 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     generate = ["generate", run, "--audio", str(tmp_path / "speech.wav"), "--samples", "2"]
     assert main([*generate, "--out", out]) == 0
     names = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert names == ["index.html", "sample_00.bvh", "sample_00.npz", "sample_01.bvh", "sample_01.npz"]
+    assert names == ["checks.json", "index.html", "sample_00.bvh", "sample_00.npz", "sample_01.bvh", "sample_01.npz"]
     motion = read_motion_npz(tmp_path / "out" / "sample_00.npz")
     assert motion.frames == round(3.7 * 30)
     with np.load(tmp_path / "out" / "sample_00.npz", allow_pickle=False) as arrays:

@@ -1,12 +1,14 @@
-"""Generation that checks every motion, and draws it again where a body could not do it."""
+"""Generation that checks every motion, and eases or draws it again where a body could not do it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from a2g_jax.errors import InputError
+from a2g_jax.generation.ease import ease
 from a2g_jax.generation.generator import Audio, Sampler
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.metrics.body.bounds import BodyBounds
@@ -27,7 +29,9 @@ class SampleReport:
     findings: tuple[BodyFinding, ...]
     """On the motion that was kept; none if it is good."""
     before: tuple[BodyFinding, ...] = ()
-    """On the first draw, where another one was kept."""
+    """On the first draw as it was drawn, where something else was kept."""
+    eased: bool = False
+    """Whether joints of the motion that was kept were eased back (:func:`~a2g_jax.generation.ease.ease`)."""
 
     def lines(self) -> list[str]:
         """What a person wants to know: nothing on a sample that was good at once."""
@@ -36,7 +40,9 @@ class SampleReport:
             rest = f", and {more} more" if more else ""
             return [f"sample {self.sample}: OUTSIDE THE BOUNDS OF A BODY after {_times(self.draws)}: {worst}{rest}"]
         if self.before:
-            return [f"sample {self.sample}: good after {_times(self.draws)}; the first had: {self.before[0]}"]
+            how = "joints eased back" if self.eased else ""
+            how += (" in " if how else "good after ") + _times(self.draws) if self.draws > 1 else ""
+            return [f"sample {self.sample}: {how}; before: {self.before[0]}"]
         return []
 
     def to_json(self) -> dict[str, Any]:
@@ -44,6 +50,7 @@ class SampleReport:
         return {
             "sample": self.sample,
             "draws": self.draws,
+            "eased": self.eased,
             "findings": [finding.to_json() for finding in self.findings],
             "first_draw": [finding.to_json() for finding in self.before],
         }
@@ -53,8 +60,9 @@ class SampleReport:
 class Checked:
     """A sampler whose motions are checked against the bounds of the run's training motion.
 
-    A bad sample is drawn again, up to :data:`REDRAWS` times, and the draw with the fewest frames outside is kept. A
-    good sample is the wrapped sampler's own, bit for bit; sample k depends on the audio, the run, the seed and k alone.
+    Joints of a bad sample that are bent or turned too far are eased back; if that is not enough, it is drawn again, up
+    to :data:`REDRAWS` times, and the draw with the fewest frames outside is kept. A good sample is the wrapped
+    sampler's own, bit for bit; sample k depends on the audio, the run, the seed and k alone.
 
     The wrapped sampler may have these attributes: ``stretches``, frames with bounds of their own
     (:class:`~a2g_jax.metrics.body.check.Stretch`), such as those of pinned clips; ``varies``, false if another seed
@@ -74,7 +82,7 @@ class Checked:
         """Bounds of the run."""
         return self.run.config.body_bounds
 
-    @property
+    @cached_property
     def stretches(self) -> Sequence[Stretch]:
         """Frames with other bounds."""
         return tuple(getattr(self.sampler, "stretches", ()))
@@ -114,24 +122,36 @@ class Checked:
         """Summary of the reports for the terminal."""
         good = sum(not report.findings for report in self.reports)
         again = sum(report.draws > 1 for report in self.reports)
-        drawn = f", {again} drawn again" if again else ""
-        first = f"checked: {good} of {len(self.reports)} within the bounds of {self.bounds.source}{drawn}"
+        eased = sum(report.eased for report in self.reports)
+        parts = [f"{eased} eased back" if eased else "", f"{again} drawn again" if again else ""]
+        note = f" ({', '.join(part for part in parts if part)})" if eased or again else ""
+        first = f"checked: {good} of {len(self.reports)} within the bounds of {self.bounds.source}{note}"
         return [first, *(line for report in self.reports for line in report.lines())]
 
     def _check(self, audio: Audio, seed: int, sample: int, motion: Motion) -> tuple[Motion, SampleReport]:
-        best = first = check_motion(motion, self.bounds, self.stretches)
-        kept, draws = motion, 1
-        while best and draws <= REDRAWS and self._helps(best):
+        first = check_motion(motion, self.bounds, self.stretches)
+        kept, draws = self._eased(motion, first), 1
+        while kept.findings and draws <= REDRAWS and self._helps(kept.findings):
             again, entry = self._again(audio, redrawn_seed(seed, sample, draws))
             draws += 1
             if _same(again, motion):
                 break
-            found = check_motion(again, self.bounds, self.stretches)
-            if _badness(found, again) < _badness(best, kept):
-                best, kept = found, again
+            other = self._eased(again, check_motion(again, self.bounds, self.stretches))
+            if other.badness < kept.badness:
+                kept = other
                 if entry is not None:
                     self.sampler.reports[sample] = entry  # type: ignore[attr-defined]
-        return kept, SampleReport(sample, draws, best, first if kept is not motion else ())
+        before = first if kept.motion is not motion else ()
+        return kept.motion, SampleReport(sample, draws, kept.findings, before, kept.eased)
+
+    def _eased(self, motion: Motion, findings: tuple[BodyFinding, ...]) -> "_Draw":
+        """The motion with its joints eased back, if that leaves fewer frames outside."""
+        drawn = _Draw(motion, findings)
+        if not findings or findings[0].figure == "finite":
+            return drawn
+        other = ease(motion, findings, self.bounds, self.stretches)
+        eased = _Draw(other, check_motion(other, self.bounds, self.stretches), eased=True)
+        return eased if eased.badness < drawn.badness else drawn
 
     def _helps(self, findings: Sequence[BodyFinding]) -> bool:
         """Whether another draw can help: the motion of a pinned clip is the same in each."""
@@ -152,14 +172,24 @@ class Checked:
         return motion, entry
 
 
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    """A motion with the findings on it."""
+
+    motion: Motion
+    findings: tuple[BodyFinding, ...]
+    eased: bool = False
+
+    @property
+    def badness(self) -> tuple[bool, int]:
+        """NaN is worst, then the number of frames outside."""
+        broken = any(one.figure == "finite" for one in self.findings)
+        return broken, frames_outside(self.findings, self.motion.frames)
+
+
 def redrawn_seed(seed: int, sample: int, attempt: int) -> int:
     """Seed of another draw of a sample: a hash of seed, sample and number of the attempt, from 0 to 2**31 - 1."""
     return int(np.random.SeedSequence([seed, sample, attempt]).generate_state(1)[0] >> 1)
-
-
-def _badness(findings: Sequence[BodyFinding], motion: Motion) -> tuple[bool, int]:
-    """NaN is worst, then the number of frames outside."""
-    return any(one.figure == "finite" for one in findings), frames_outside(findings, motion.frames)
 
 
 def _same(one: Motion, other: Motion) -> bool:

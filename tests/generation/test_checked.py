@@ -74,7 +74,7 @@ def test_a_bad_sample_is_drawn_again(run):
     assert sampler.reports == [(7, 0), (redrawn_seed(7, 1, 2), 0), (7, 2), (7, 3)]
     assert [report.draws for report in checked.reports] == [1, 3, 1, 1]
     assert all(check_motion(motion, checked.bounds) == () for motion in motions)
-    assert "sample 1: good after 3 draws; the first had: 2.00 s (frame 60): L_Elbow" in checked.lines()[1]
+    assert "sample 1: good after 3 draws; before: 2.00 s (frame 60): L_Elbow" in checked.lines()[1]
     alone = list(Checked(run, Scripted(bad)).stream(SPEECH, 2, 7))
     for one, other in zip(alone, motions, strict=False):
         np.testing.assert_array_equal(one.root, other.root)

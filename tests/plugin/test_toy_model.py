@@ -154,7 +154,7 @@ def test_the_commands_take_it(toy_run, toy_corpus, tmp_path, capsys):
     out = tmp_path / "out"
     arguments = ["generate", str(toy_run), "--audio", str(speech), "--out", str(out), "--samples", "2"]
     assert main([*arguments, "--formats", "npz", "--scale", "0.5"]) == 0
-    assert sorted(path.name for path in out.iterdir()) == ["sample_00.npz", "sample_01.npz"]
+    assert sorted(path.name for path in out.iterdir()) == ["checks.json", "sample_00.npz", "sample_01.npz"]
     capsys.readouterr()
     assert main(["generate", str(toy_run), "--settings"]) == 0
     assert "--scale 1.0" in capsys.readouterr().out

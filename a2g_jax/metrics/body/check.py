@@ -73,13 +73,16 @@ class Stretch:
 def check_motion(
     motion: Motion, bounds: BodyBounds | None = None, stretches: Sequence[Stretch] = ()
 ) -> tuple[BodyFinding, ...]:
-    """Findings on frames outside bounds, the furthest outside first; none for a sound motion.
+    """Findings on frames outside bounds; none for a sound motion.
 
     Args:
         motion: on the skeleton of the bounds, at any frame rate.
         bounds: of a run (:attr:`~a2g_jax.training.run_config.RunConfig.body_bounds`); those of any person if None,
             measured from the motion's own mean pose.
         stretches: frames with other bounds; where several overlap, the highest one of each figure holds.
+
+    Returns:
+        The furthest outside first; speed and jerk of the wrists, which mostly follow from a joint of the arm, last.
 
     Raises:
         ValueError: another number of joints than that of the bounds.
@@ -100,7 +103,7 @@ def check_motion(
         for column in np.flatnonzero(outside.any(axis=0)):
             joint = bounds.reference.parts[name][column]
             found += _findings(name, joint, values[:, column], high[:, column], outside[:, column], motion.fps)
-    return tuple(sorted(found, key=lambda one: (-_excess(one), one.frame)))
+    return tuple(sorted(found, key=lambda one: (one.figure.startswith("wrist"), -_excess(one), one.frame)))
 
 
 def frames_outside(findings: Iterable[BodyFinding], frames: int) -> int:

@@ -1,0 +1,103 @@
+"""Joints that are bent or turned too far are eased back; all else stays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from a2g_jax.generation.checked import Checked
+from a2g_jax.generation.ease import _compressed, ease
+from a2g_jax.metrics.body.bounds import bounds_of, extremes
+from a2g_jax.metrics.body.check import Stretch, check_motion
+from a2g_jax.metrics.body.figures import Reference
+from a2g_jax.talker.recordings import talk
+
+MOTION = talk(20.0, 1).motion
+NAMES = MOTION.skeleton.names
+POSE = Rotation.from_matrix(np.asarray(MOTION.rotations, np.float64).mean(axis=0)).as_matrix()
+REFERENCE = Reference(MOTION.skeleton, POSE, float(MOTION.root[:, 1].mean()))
+BOUNDS = bounds_of(REFERENCE, extremes([MOTION], REFERENCE))
+
+
+def swung(joint, axis, degrees, begin=200, frames=60):
+    """The motion with a joint that turns about an axis of its parent and back, smoothly, in two seconds."""
+    amount = np.zeros(MOTION.frames)
+    amount[begin : begin + frames] = degrees * np.sin(np.pi * np.arange(frames) / frames) ** 2
+    turn = Rotation.from_rotvec(np.radians(amount)[:, None] * np.asarray(axis, np.float64))
+    rotations = np.array(MOTION.rotations)
+    rotations[:, NAMES.index(joint)] = (turn * Rotation.from_matrix(rotations[:, NAMES.index(joint)])).as_matrix()
+    return replace(MOTION, rotations=rotations)
+
+
+@pytest.mark.parametrize(
+    ("joint", "axis", "degrees", "figure"),
+    [
+        ("R_Elbow", -REFERENCE.axes[1], 120.0, "backwards"),
+        ("L_Elbow", REFERENCE.axes[0], 70.0, "bend"),
+        ("Head", (0.0, 1.0, 0.0), 100.0, "range"),
+        ("L_Wrist", (0.0, 1.0, 0.0), 100.0, "range"),
+    ],
+)
+def test_within_the_bounds(joint, axis, degrees, figure):
+    bad = swung(joint, axis, degrees)
+    findings = check_motion(bad, BOUNDS)
+    assert (figure, joint) in {(one.figure, one.joint) for one in findings}
+    eased = ease(bad, findings, BOUNDS)
+    assert check_motion(eased, BOUNDS) == ()
+    others = [number for number, name in enumerate(NAMES) if name != joint]
+    np.testing.assert_array_equal(eased.rotations[:, others], bad.rotations[:, others])
+    np.testing.assert_array_equal(eased.root, bad.root)
+    # Frames before, which come no nearer to the bounds than recorded motion, hardly change.
+    np.testing.assert_allclose(eased.rotations[:190], bad.rotations[:190], atol=1e-3)
+    jerk = REFERENCE.figures(eased)["wrist_jerk"].max()
+    assert jerk < 1.5 * REFERENCE.figures(bad)["wrist_jerk"].max()
+
+
+def test_legs_and_stretches_stay():
+    knee = swung("L_Knee", (1.0, 0.0, 0.0), -70.0)
+    findings = check_motion(knee, BOUNDS)
+    assert any(one.joint == "L_Knee" for one in findings)
+    np.testing.assert_array_equal(ease(knee, findings, BOUNDS).rotations, knee.rotations)
+    head = swung("Head", (0.0, 1.0, 0.0), 100.0)
+    eased = ease(head, check_motion(head, BOUNDS), BOUNDS, [Stretch(200, 260, BOUNDS)])
+    np.testing.assert_array_equal(eased.rotations[200:260], head.rotations[200:260])
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(20.0, 170.0), st.lists(st.floats(-180.0, 180.0), min_size=2, max_size=20))
+def test_compression(bound, values):
+    """No angle passes the bound, order is kept, no step grows, and angles well inside stay."""
+    values = np.sort(np.asarray(values))
+    small = _compressed(values, bound)
+    assert np.all(small <= bound - 1.9)
+    assert np.all(np.diff(small) >= 0.0)
+    assert np.all(np.diff(small) <= np.diff(values) + 1e-9)
+    np.testing.assert_array_equal(small[values < bound - 17.0], values[values < bound - 17.0])
+
+
+def test_a_bad_sample_is_eased_before_it_is_drawn_again(toy_run_config):
+    from a2g_jax.training.run import Run
+
+    class Bent:
+        draws = 0
+
+        def stream(self, audio, samples, seed=0):
+            self.draws += 1
+            yield swung("R_Elbow", -REFERENCE.axes[1], 120.0)
+
+    run, sampler = Run(toy_run_config(), {}, {}, 0), Bent()
+    run.config.__dict__["body_bounds"] = BOUNDS  # a cached property
+    checked = Checked(run, sampler)
+    (motion,) = checked.stream(np.zeros(16000, np.float32), 1)
+    assert sampler.draws == 1
+    assert check_motion(motion, BOUNDS) == ()
+    (report,) = checked.reports
+    assert (report.eased, report.draws, report.findings) == (True, 1, ())
+    assert report.before[0].figure == "backwards"
+    first, second = checked.lines()
+    assert first == "checked: 1 of 1 within the bounds of the training split with margins (1 eased back)"
+    assert second.startswith("sample 0: joints eased back; before: ")
+    assert "R_Elbow is bent backwards by" in second
