@@ -94,8 +94,8 @@ class Bounds:
     """Seconds; shorter clips are lost in their transitions."""
     turn: float | None = FLIP
     """Degrees per second."""
-    wrist_speed: float | None = 10.0
-    """m/s; that of a punch."""
+    wrist_speed: float | None = 6.0
+    """m/s; the liveliest talk has 3 to 4.5."""
     tilt: float | None = 75.0
     """Degrees of the trunk from the vertical; a body that lies or stands on its hands cannot be put on its feet."""
     from_mean: float | None = 50.0
