@@ -10,6 +10,7 @@ from a2g_jax.data.corpus_writer import prepare_recording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import resample
+from a2g_jax.geometry.retarget import find_rig, retarget, upper_body_skeleton
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.views import directions as ted
@@ -61,6 +62,15 @@ def test_upper_body_is_where_the_talker_is(take):
     world, before = view.world_rotations(), source.world_rotations()
     np.testing.assert_allclose(world[:, [a for a, _ in shared]], before[:, [b for _, b in shared]], atol=2e-6)
     np.testing.assert_allclose(view.root, source.positions()[:, names.index("Spine3")], atol=2e-6)
+
+
+def test_a_recorded_rig_has_the_same_joints_and_rotations(take):
+    """Generated talk as BEAT shows it is what retargeting to the upper body makes of the talker."""
+    view, rig = beat.upper_body(take.motion, 30.0), find_rig(take.motion)
+    same = retarget(take.motion, upper_body_skeleton(rig), source=rig)
+    assert view.skeleton.same_tree(same.skeleton)
+    turning = [joint for joint, name in enumerate(beat.SOURCES) if name]
+    np.testing.assert_allclose(view.rotations[:, turning], same.rotations[:, turning], atol=1e-4)
 
 
 def test_metacarpals_lie_in_the_palm_and_do_not_move(take):

@@ -10,7 +10,11 @@ from a2g_jax.nn.tcn import TCN
 
 
 class AttentionEncoder(nn.Module):
-    """Transformer encoder layers over a whole clip (Vaswani et al. 2017), with sinusoidal positions."""
+    """Transformer encoder layers over a whole clip, with sinusoidal positions.
+
+    Layers normalise their input (Xiong et al. 2020): with normalised outputs, as in Vaswani et al. 2017, training
+    without a long warm-up stopped at a constant answer.
+    """
 
     width: int
     layers: int
@@ -22,11 +26,11 @@ class AttentionEncoder(nn.Module):
         x = nn.Dense(self.width)(x) + positions(x.shape[1], self.width)[None]
         for _ in range(self.layers):
             attention = nn.MultiHeadDotProductAttention(self.heads, dropout_rate=self.dropout)
-            y = attention(x, x, deterministic=deterministic)
-            x = nn.LayerNorm()(x + nn.Dropout(self.dropout)(y, deterministic=deterministic))
-            y = nn.Dense(self.width)(nn.relu(nn.Dense(4 * self.width)(x)))
-            x = nn.LayerNorm()(x + nn.Dropout(self.dropout)(y, deterministic=deterministic))
-        return x
+            y = attention(nn.LayerNorm()(x), deterministic=deterministic)
+            x = x + nn.Dropout(self.dropout)(y, deterministic=deterministic)
+            y = nn.Dense(self.width)(nn.relu(nn.Dense(4 * self.width)(nn.LayerNorm()(x))))
+            x = x + nn.Dropout(self.dropout)(y, deterministic=deterministic)
+        return nn.LayerNorm()(x)
 
 
 def positions(frames: int, width: int) -> Float[Array, "T D"]:
