@@ -13,13 +13,18 @@ if TYPE_CHECKING:
 
 DESCRIPTION = (
     "Score runs on a held-out split, beside the scores of the ground truth, other right motions, noise, a neighbour's"
-    " motion, a held pose and the mean pose."
+    " motion, a held pose and the mean pose. Of emotion classifiers: confusion matrices."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g evaluate``."""
-    parser.add_argument("runs", nargs="*", metavar="RUN", help="run folders, demo or demo-flow; none: baselines only")
+    parser.add_argument(
+        "runs",
+        nargs="*",
+        metavar="RUN",
+        help="run folders, demo or demo-flow, or runs of emotion_classifier; none: baselines only",
+    )
     parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
     parser.add_argument(
         "--out", required=True, metavar="DIR", help="folder for report.json, .md, .tex and, with Matplotlib, .png"
@@ -62,6 +67,13 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         InputError: a run, corpus, report or feature network that cannot be used, or that do not belong together.
     """
     result = _compare(options) if options.compare else _score(options)
+    if "classifiers" in result:
+        from a2g_jax.evaluation import confusion_report
+
+        written = confusion_report.write_confusion(result, Path(options.out))
+        print(confusion_report.markdown(result))
+        print(f"{options.out}: {', '.join(path.name for path in written)}")
+        return
 
     from a2g_jax.evaluation.report import markdown, write_report
 
@@ -83,6 +95,7 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.data.corpus import Corpus
+    from a2g_jax.evaluation.confusion import classify_split, is_classifier
     from a2g_jax.evaluation.emotion_judge import load_emotion_judge
     from a2g_jax.evaluation.evaluate import evaluate
     from a2g_jax.evaluation.feature_network import load_feature_network
@@ -96,6 +109,11 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
     keep_compilations()
     runs: dict[str, Run] = {name: open_run(name) for name in options.runs}
     corpus = Corpus.open(options.corpus)
+    if any(is_classifier(run) for run in runs.values()):
+        for flag in ("features", "emotion_classifier", "audit", "metric"):
+            if getattr(options, flag):
+                raise InputError(f"--{flag.replace('_', '-')} is for runs that generate motion; leave it out.")
+        return classify_split(runs, corpus, split=options.split, seed=options.seed)
     network = load_feature_network(options.features, corpus) if options.features else None
     judge = load_emotion_judge(options.emotion_classifier, corpus) if options.emotion_classifier else None
     with progress_bar(1, "scoring", "motion") as bar:

@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
-from a2g_jax.cli import demo, evaluate, generate, inspect, prepare, retarget, talk, train
+from a2g_jax.cli import demo, evaluate, generate, inspect, label, prepare, retarget, talk, train
 from a2g_jax.errors import A2GError, Interrupted
 
 #: The module of each command: ``DESCRIPTION``, ``add_arguments(parser)`` and ``run(options, extra)``, which returns
@@ -17,6 +17,7 @@ COMMANDS: dict[str, ModuleType] = {
     "demo": demo,
     "talk": talk,
     "prepare": prepare,
+    "label": label,
     "train": train,
     "generate": generate,
     "inspect": inspect,

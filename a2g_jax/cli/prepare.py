@@ -5,7 +5,7 @@ import dataclasses
 import textwrap
 from typing import TYPE_CHECKING
 
-from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, seed
+from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, seed, share
 from a2g_jax.cli.paths import existing_file, existing_folder
 from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
@@ -21,10 +21,10 @@ DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: th
 READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
 _GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
-_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit")
+_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled")
 
 
-def _reader(text: str) -> str:
+def reader_name(text: str) -> str:
     """A name of a data set, the path of a Python file, or ``module:name``."""
     known = ("talker", *all_names())
     if text not in known and not is_reference(text):
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "reader",
         nargs="?",
-        type=_reader,
+        type=reader_name,
         metavar="NAME",
         help="folder (WAV and BVH of equal names), talker, a data set (see --list), a reader.py, or"
         " package.module:READER",
@@ -75,6 +75,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
     recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")
     recorded.add_argument("--limit", type=natural, help="maximum number of recordings")
+    recorded.add_argument(
+        "--labels", metavar="TABLE", help="emotions by window of 'a2g label'; only labelled stretches are prepared"
+    )
+    recorded.add_argument(
+        "--confidence", type=share, help="with a table: least probability of a window's emotion (default: 0.9)"
+    )
+    recorded.add_argument("--labelled", action="store_true", help="leave out recordings without an emotion")
     generated = parser.add_argument_group("generated talk")
     generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
     generated.add_argument("--speakers", metavar="NAMES", help="speakers, comma-separated (default: all)")
@@ -84,12 +91,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAMES",
         help="in equal shares, any of invented, en, de, es, fr, it (default: invented; others need a2g_jax[voices])",
     )
-    generated.add_argument("--jitter", type=positive, metavar="DEGREES", help="capture noise on the generated motion")
+    generated.add_argument(
+        "--jitter",
+        type=positive,
+        metavar="DEGREES",
+        help="capture noise on the generated motion; the same command without it gives the clean motion",
+    )
     generated.add_argument("--fingers", action="store_true", help="52 joints with fingers instead of the body's 22")
     generated.add_argument(
         "--view",
         choices=("body", "beat", "ted", "ted-expressive", "s2g"),
-        help="show the speakers as a data set does: joints, bone directions or keypoints (default: body)",
+        help="show the speakers as a data set does: joints, bone directions or keypoints (default: beat with --features"
+        " emotion-gesture, else body)",
     )
     generated.add_argument(
         "--on-demand",
@@ -136,7 +149,9 @@ def _generated(options: argparse.Namespace) -> "Corpus":
     from a2g_jax.data.on_demand import OnDemand
     from a2g_jax.data.prepare import prepare_talker, view_poses
 
-    view = options.view or "body"
+    # A paper on the upper body has its generated corpus in the same form.
+    upper = _features(options).joints == "upper-body" and not options.fingers
+    view = options.view or ("beat" if upper else "body")
     if options.pose and options.pose not in view_poses(view):
         raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
     return prepare_talker(
@@ -177,6 +192,7 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
     if options.reader.endswith(".py"):
         existing_file(options.reader, "name a Python file that defines DATASET")
     existing_folder(options.source)
+    existing_file(options.labels, "make it with 'a2g label'")
 
     from a2g_jax.data.datasets import find_data_set
     from a2g_jax.data.prepare import prepare_data_set
@@ -194,6 +210,9 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         official=not options.random_split,
         skip_broken=options.skip_broken,
         limit=options.limit,
+        labels=options.labels,
+        confidence=options.confidence,
+        labelled=options.labelled,
         workers=options.workers,
     )
 

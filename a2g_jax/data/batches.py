@@ -117,13 +117,19 @@ class BatchMaker:
         return {"mirrored": chosen, **poses}
 
 
-def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " clips"]:
-    """First rows of the clips that tile a split without overlap; a stretch's remainder is left out.
+def tiled_starts(corpus: Corpus, split: str, frames: int, stride: int | None = None) -> Int[np.ndarray, " clips"]:
+    """First rows of the clips that tile a split; a stretch's remainder is left out.
 
     A split whose stretches are all shorter than a clip gives none.
+
+    Args:
+        frames: of a clip.
+        stride: frames from one clip to the next; a whole clip, so that none overlap, if None.
     """
     starts = [
-        start for segment in corpus.segments(split) for start in range(segment.start, segment.stop - frames + 1, frames)
+        start
+        for segment in corpus.segments(split)
+        for start in range(segment.start, segment.stop - frames + 1, stride or frames)
     ]
     return np.array(starts, np.int32)
 

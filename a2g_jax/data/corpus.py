@@ -163,6 +163,19 @@ class Corpus:
                 f" Prepare one with --pose {kinds[0]}."
             )
 
+    def require_emotions(self) -> None:
+        """Refuse a corpus with recordings that have no emotion.
+
+        Raises:
+            InputError: there are some.
+        """
+        without = [entry.name for entry in self.recordings if not entry.emotion]
+        if without:
+            raise InputError(
+                f"{self.path}: {len(without)} of {len(self.recordings)} recordings have no emotion, such as"
+                f" {without[0]}; leave them out with 'a2g prepare ... --labelled', or label them with 'a2g label'."
+            )
+
     @cached_property
     def emotions(self) -> tuple[str, ...]:
         """Emotions of the corpus, including recordings to be generated, in alphabetical order."""

@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -57,6 +57,8 @@ class Plan:
     """Training recordings to be generated during training, see :mod:`a2g_jax.data.on_demand`; or empty."""
     official: bool = True
     """Whether to use the data set's official split where it has one."""
+    groups: Mapping[str, str] = field(default_factory=dict)
+    """Group of a recording by its name, for splits by the seed; a recording without one is a group of its own."""
     skip_broken: bool = False
     """Whether a recording that cannot be prepared is noted and left out instead of raising its error."""
 
@@ -228,7 +230,8 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
         )
     work.finish_arrays()
     parts = [entry.split if plan.official else "" for entry in entries]
-    splits = official_splits([entry.frames for entry in entries], parts, plan.seed)
+    groups = [plan.groups.get(entry.name) or entry.name for entry in entries]
+    splits = official_splits([entry.frames for entry in entries], parts, plan.seed, groups)
     if not splits["train"]:
         raise InputError(f"{path}: no recordings for training; add some, or split by the seed (--random-split).")
     _write_statistics(folder, entries, splits)

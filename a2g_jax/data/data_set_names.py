@@ -12,6 +12,7 @@ MODULES: dict[str, str] = {
     "zeroeggs": "zeroeggs",
     "ted": "ted",
     "ted-expressive": "ted_expressive",
+    "ted-emotion": "ted_emotion",
     "s2g": "s2g",
     "pats": "pats",
     "show": "show",

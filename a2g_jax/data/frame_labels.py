@@ -1,12 +1,13 @@
 """Labels and words of recordings as one row a frame."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Int32
 
-from a2g_jax.io.transcripts import words_at_frames
+from a2g_jax.io.transcripts import FRAME_SLACK, words_at_frames
 from a2g_jax.io.words import Word, word_id
 
 
@@ -29,13 +30,19 @@ def word_rows(
 ) -> tuple[Int32[np.ndarray, " T"], Bool[np.ndarray, " T"]]:
     """Ids of the words that are spoken at each frame, and whether a word starts within it.
 
+    Frame k lasts from time ``k / fps`` to the next frame's. A word has the frame within which it starts and those at
+    whose times it is spoken. So the words at their start frames (EmotionGesture's transcript) are the ids where a word
+    starts, and 0 elsewhere. Of several words that start within one frame, the last one has it.
+
     Args:
         words: annotations, each with ``text``, ``start`` and ``end`` in seconds.
     """
     spoken = [Word(word["text"], float(word["start"]), float(word["end"])) for word in words]
     index = words_at_frames(spoken, fps, frames)
     ids = np.array([*(word_id(word.text) for word in spoken), 0], np.int32)
-    starts = np.zeros(frames, bool)
-    first = np.array([int(word.start * fps) for word in spoken], np.int64)
-    starts[first[(first >= 0) & (first < frames)]] = True
-    return ids[index], starts
+    rows, starts = ids[index], np.zeros(frames, bool)
+    for number in sorted(range(len(spoken)), key=lambda number: spoken[number].start):
+        first = math.floor(spoken[number].start * fps + FRAME_SLACK)
+        if 0 <= first < frames:
+            rows[first], starts[first] = ids[number], True
+    return rows, starts

@@ -6,11 +6,13 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
-from a2g_jax.data.datasets import Take, find_data_set
+from a2g_jax.data.datasets import LabelRule, Take, find_data_set
+from a2g_jax.data.datasets.cut import cut
+from a2g_jax.data.emotion_table import labelled_takes, read_table
 from a2g_jax.data.featurise import Prepared, Skipped, prepare_recording
 from a2g_jax.data.generated import TalkerOptions, generate_rows
 from a2g_jax.data.on_demand import OnDemand, split_roles
@@ -18,8 +20,12 @@ from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_space import interchangeable
+from a2g_jax.io.files import sha256_file
 from a2g_jax.progress import progress_bar, say
+from a2g_jax.recording import PoseRecording, Recording
 from a2g_jax.talker.views.catalogue import find_view
+
+Result = TypeVar("Result")
 
 
 def prepare_talker(
@@ -55,7 +61,7 @@ def prepare_talker(
         generate_rows, jitter=options.jitter, fingers=options.fingers, view=options.view, features=features
     )
     items = [Item(role["name"], ()) for role in roles]
-    make = partial(_make, "generating", generate, roles, workers)
+    make = partial(make_rows, "generating", generate, roles, workers)
     return prepare_corpus(out, items, make, Plan(features, recipe, options.seed, parts), say)
 
 
@@ -75,6 +81,9 @@ def prepare_data_set(
     official: bool = True,
     skip_broken: bool = False,
     limit: int | None = None,
+    labels: str | os.PathLike[str] | None = None,
+    confidence: float | None = None,
+    labelled: bool = False,
     workers: int | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
@@ -86,6 +95,10 @@ def prepare_data_set(
         official: use the official split.
         skip_broken: leave out recordings that cannot be prepared, and note them in the manifest.
         limit: largest number of recordings, spread evenly over all.
+        labels: table of emotions by window (:mod:`a2g_jax.data.emotion_table`); the corpus then has the pieces of
+            recordings in which an emotion is sure. Some data sets bring their own.
+        confidence: least probability of a window's emotion in the table; of the data set, or 0.9, if None.
+        labelled: leave out recordings without an emotion, and note them in the manifest.
         workers: number of processes; one for every core if None.
 
     Raises:
@@ -96,22 +109,66 @@ def prepare_data_set(
     takes = reader.find(folder)
     if limit is not None and limit < len(takes):
         takes = [takes[number * len(takes) // limit] for number in range(limit)]
+    recipe: dict[str, Any] = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}
+    takes = _pieces(takes, reader.labels, folder, labels, confidence, recipe)
     if official and takes and all(take.split in ("validation", "test") for take in takes):
         raise InputError(
             f"{folder}: all {len(takes)} recordings are for validation and testing in the official split, none for"
             " training; add training recordings, or split by the seed with --random-split."
         )
-    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken)
+    if labelled:
+        recipe["labelled"] = True
+    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken, labelled=labelled)
     items = [Item(take.name, take.sources) for take in takes]
-    recipe = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}
-    plan = Plan(features, recipe, seed, official=official, skip_broken=skip_broken)
-    return prepare_corpus(out, items, partial(_make, "preparing", read, takes, workers), plan, say)
+    groups = {take.name: take.group for take in takes if take.group}
+    plan = Plan(features, recipe, seed, official=official, groups=groups, skip_broken=skip_broken)
+    return prepare_corpus(out, items, partial(make_rows, "preparing", read, takes, workers), plan, say)
 
 
-def _make(
-    what: str, work: Callable[[Any], Prepared | Skipped], inputs: Sequence[Any], workers: int | None, done: int
-) -> Generator[Prepared | Skipped, None, None]:
-    """Rows of the inputs after the finished ones, in order, with a progress bar."""
+def _pieces(
+    takes: list[Take],
+    rule: LabelRule | None,
+    folder: Path,
+    labels: str | os.PathLike[str] | None,
+    confidence: float | None,
+    recipe: dict[str, Any],
+) -> list[Take]:
+    """The labelled pieces of takes, where there is a table of emotions; it becomes part of the recipe."""
+    if rule is None and labels is None:
+        if confidence is not None:
+            raise InputError("--confidence is for tables of emotions; add --labels TABLE (see 'a2g label').")
+        return takes
+    rule = rule or LabelRule()
+    rule = rule if confidence is None else replace(rule, confidence=confidence)
+    table = Path(labels) if labels is not None else folder / rule.table
+    if labels is None and not table.is_file():
+        raise InputError(
+            f"{table}: there is no such table of emotions; make it with 'a2g label', or name one with --labels."
+        )
+    found = labelled_takes(takes, read_table(table), rule, table)
+    say(f"{table}: {found.describe()}")
+    recipe["labels"] = {
+        "table": os.fspath(table),
+        "sha256": sha256_file(table),
+        "confidence": rule.confidence,
+        "emotions": list(rule.emotions),
+        **{name: getattr(found, name) for name in ("windows", "kept", "doubtful", "contested", "unlabelled")},
+        "other": dict(found.other),
+    }
+    return list(found.takes)
+
+
+def make_rows(
+    what: str, work: Callable[[Any], Result], inputs: Sequence[Any], workers: int | None, done: int
+) -> Generator[Result, None, None]:
+    """Results of the inputs after the finished ones, in order, with a progress bar.
+
+    Args:
+        what: for the bar, such as ``"preparing"``.
+        work: a function that processes can import, of one input.
+        workers: number of processes; one for every core if None.
+        done: number of inputs that are finished.
+    """
     rest = inputs[done:]
     # Starting a process costs as much as a few recordings.
     count = min(os.cpu_count() or 1, len(rest) // 4) if workers is None else min(workers, len(rest))
@@ -119,7 +176,7 @@ def _make(
         bar = stack.enter_context(progress_bar(len(inputs), what, "recording"))
         # Recordings finished before do not count for the rate.
         bar.initial = bar.n = done
-        rows: Iterable[Prepared | Skipped] = map(work, rest)
+        rows: Iterable[Result] = map(work, rest)
         if count > 1:
             pool = stack.enter_context(
                 worker_pool(count, "run the same command to resume, with fewer --workers if necessary")
@@ -130,11 +187,25 @@ def _make(
             bar.update()
 
 
-def _read_rows(take: Take, name: str, features: Features, skip_broken: bool) -> Prepared | Skipped:
+def read_take(take: Take, name: str, sample_rate: int) -> Recording | PoseRecording:
+    """A recording of a data set, or the labelled piece of it, with the name and the files of its take.
+
+    Args:
+        name: of the data set.
+    """
+    recording = replace(find_data_set(name).read(take, sample_rate), name=take.name, sources=take.sources)
+    if take.piece is None:
+        return recording
+    piece = take.piece
+    annotations = {**recording.annotations, "piece": {"from": piece.start, "confidence": piece.confidence}}
+    return replace(cut(recording, piece.start, piece.end), emotion=piece.emotion, annotations=annotations)
+
+
+def _read_rows(take: Take, name: str, features: Features, skip_broken: bool, labelled: bool) -> Prepared | Skipped:
     try:
-        recording = find_data_set(name).read(take, features.mel.sample_rate)
-        # In a corpus a recording has the name and the files of its take.
-        recording = replace(recording, name=take.name, sources=take.sources)
+        recording = read_take(take, name, features.mel.sample_rate)
+        if labelled and not recording.emotion:
+            return Skipped(take.name, take.sources, f"{take.sources[0]}: has no emotion label.")
         return prepare_recording(recording, features, take.split)
     except InputError as error:
         if not skip_broken:

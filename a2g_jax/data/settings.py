@@ -59,6 +59,8 @@ PRESETS: dict[str, Features] = {
     ),
     # EmotionGesture: 47 joints in 6D at 15 frames a second; its 128 x 124 windows are made from the waveform.
     "emotion-gesture": Features(fps=15.0, joints="upper-body", waveform=True),
+    # The same on TED: 43 joints, here as directions of 42 bones, since points do not determine rotations.
+    "emotion-gesture-ted": Features(fps=15.0, pose="directions", joints="all", waveform=True),
 }
 
 

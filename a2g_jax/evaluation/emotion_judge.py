@@ -17,6 +17,7 @@ from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.io.files import sha256_file
+from a2g_jax.metrics.labels import emotion_accuracy
 from a2g_jax.training.perceptual import check_poses
 from a2g_jax.training.run import Run, load_run
 from a2g_jax.training.run_file import WEIGHTS_FILE
@@ -31,29 +32,45 @@ class EmotionJudge:
     """SHA-256 of its weights."""
 
     @cached_property
-    def _logits(self) -> Any:
+    def _probabilities(self) -> Any:
         config = self.run.config
         classifier, bands = config.build().classifier, config.mel.width
         assert classifier is not None
-        return jax.jit(lambda params, pose: classifier.logits(params, Batch(jnp.zeros((*pose.shape[:2], bands)), pose)))
+
+        def probabilities(params: Any, pose: Any) -> Any:
+            return jax.nn.softmax(classifier.logits(params, Batch(jnp.zeros((*pose.shape[:2], bands)), pose)))
+
+        return jax.jit(probabilities)
+
+    @property
+    def emotions(self) -> tuple[str, ...]:
+        """Its classes."""
+        return tuple(self.run.config.corpus["emotions"])
+
+    def probabilities(self, pose: Pose) -> Float[np.ndarray, "n K"]:
+        """Probability of each emotion in the clips of a motion, one after another; a remainder is left out."""
+        frames: int = self.run.config.model_config.clip_frames
+        count = len(pose) // frames
+        if count == 0:
+            return np.zeros((0, len(self.emotions)), np.float32)
+        clips = np.asarray(pose[: count * frames], np.float32).reshape(count, frames, *pose.shape[1:])
+        return np.asarray(self._probabilities(self.run.params, clips))
 
     def accuracy(self, pose: Pose, emotion: str) -> float:
         """Share of the motion's clips that are classified as the emotion (EmotionGesture's EA); NaN for motion shorter
         than a clip and for emotions that the classifier lacks."""
-        frames: int = self.run.config.model_config.clip_frames
-        names, count = self.run.config.corpus["emotions"], len(pose) // frames
-        if count == 0 or emotion not in names:
+        rows = self.probabilities(pose)
+        if len(rows) == 0 or emotion not in self.emotions:
             return float("nan")
-        clips = np.asarray(pose[: count * frames], np.float32).reshape(count, frames, *pose.shape[1:])
-        logits = np.asarray(self._logits(self.run.params, clips))
-        return float(np.mean(np.argmax(logits, axis=-1) == names.index(emotion)))
+        return emotion_accuracy(rows, np.full(len(rows), self.emotions.index(emotion)))
 
 
 def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> EmotionJudge:
     """Load a run of ``emotion_classifier`` for the motion of a corpus.
 
     Raises:
-        InputError: another model, one with audio as input, or one for other poses, frame rates or emotions.
+        InputError: another model, one with audio as input, one for other poses, frame rates or emotions, or one that
+            was trained on motion with capture noise.
     """
     run = load_run(folder)
     config = run.config
@@ -67,6 +84,11 @@ def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> Emotio
     if not set(corpus.emotions) & set(config.corpus["emotions"]):
         raise InputError(
             f"{folder}: has the emotions {', '.join(config.corpus['emotions'])}, none of which {corpus.path} has."
+        )
+    if jitter := config.corpus.get("recipe", {}).get("jitter"):
+        raise InputError(
+            f"{folder}: was trained on motion with capture noise of {jitter:g} degrees; train it on the same corpus"
+            " prepared without --jitter, so that noise does not count as an emotion."
         )
     return EmotionJudge(run, sha256_file(Path(folder) / WEIGHTS_FILE))
 

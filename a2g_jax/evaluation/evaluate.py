@@ -23,6 +23,7 @@ from a2g_jax.evaluation.baselines import (
     with_noise,
 )
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
+from a2g_jax.evaluation.emotion_tables import EmotionTally, accuracy_by_chance
 from a2g_jax.evaluation.feature_network import FeatureNetwork, check_separate, vectors_of
 from a2g_jax.evaluation.report import HALVES, MOTIONS, describe_metrics
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
@@ -54,6 +55,8 @@ class Row:
     scores: dict[str, dict[str, Any]]
     """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips), and
     for those of a feature network ``vectors`` and ``features``, their number and length."""
+    emotions: dict[str, Any] | None = None
+    """With a classifier of emotions: counts of clips by their own and their classified emotion."""
 
 
 def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
@@ -138,6 +141,7 @@ def evaluate(
         per_clip: list[list[dict[str, float]]] = []
         per_group: list[dict[str, float]] = []
         features, count = [], 0
+        tally = None if judge is None else EmotionTally(judge.emotions)
         for number, target in enumerate(targets):
             poses = draw(number)
             done += 1
@@ -149,8 +153,12 @@ def evaluate(
             per_clip.append([scorer.motion_scores(motion) for motion in motions])
             per_group.append(scorer.clip_scores(motions))
             features.append([scorer.features(pose) for pose in poses])
+            if judge is not None and tally is not None:
+                for pose in poses:
+                    tally.add(judge.probabilities(pose), target.emotion)
         if per_clip:
-            rows.append(Row(name, count, summarise(scorer, per_clip, per_group, features, reference, speakers, seed)))
+            cells = summarise(scorer, per_clip, per_group, features, reference, speakers, seed)
+            rows.append(Row(name, count, cells, None if tally is None else tally.to_json()))
     floor = None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed))
     if baselines and floor is not None:
         rows.append(Row(HALVES, 1, {"fgd": halves_cell(floor, reference.shape[1])}))
@@ -176,6 +184,10 @@ def evaluate(
         "units": units.key,
         "wrist_to_wrist": scorer.wrist_to_wrist,
     }
+    if judge is not None:
+        about["emotions"] = list(judge.emotions)
+        judged = [target.emotion for target in targets if target.emotion in judge.emotions]
+        about["emotion_chance"] = accuracy_by_chance(judged) if judged else None
     if extra_metrics:
         about["extra_metrics"] = describe_metrics(extra_metrics)
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}

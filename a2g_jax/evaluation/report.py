@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
+from a2g_jax.evaluation.emotion_tables import emotion_lines, emotions_picture
 from a2g_jax.evaluation.report_notes import condition, notes, preface
 from a2g_jax.evaluation.scores import METRICS, Metric
 from a2g_jax.io.files import atomic_path, make_folder, read_json
@@ -30,7 +31,10 @@ _LATEX_ARROWS = {"lower": r"$\downarrow$", "higher": r"$\uparrow$", "truth": r"$
 
 
 def write_report(result: dict[str, Any], out: Path) -> list[Path]:
-    """Write ``report.json``, ``report.md``, ``report.tex`` and, where Matplotlib is installed, ``report.png``."""
+    """Write ``report.json``, ``report.md``, ``report.tex`` and, where Matplotlib is installed, ``report.png``.
+
+    With a classifier of emotions also ``emotions.png``.
+    """
     make_folder(out)
     texts = {
         "report.json": json.dumps(result, indent=1) + "\n",
@@ -47,7 +51,10 @@ def write_report(result: dict[str, Any], out: Path) -> list[Path]:
     except ImportError:
         return written
     _picture(result, out / "report.png")
-    return [*written, out / "report.png"]
+    written.append(out / "report.png")
+    if emotions_picture(result, out / "emotions.png", BASELINES):
+        written.append(out / "emotions.png")
+    return written
 
 
 def markdown(result: dict[str, Any]) -> str:
@@ -65,7 +72,7 @@ def markdown(result: dict[str, Any]) -> str:
             lines.append(f"| {row['name']} | {row['samples']} | " + " | ".join(cells) + " |")
         lines.append("")
     audits = [line for name, audit in result.get("audits", {}).items() for line in _audit_lines(name, audit)]
-    return "\n".join([*preface(about), "", *lines, *notes(about), "", *audits])
+    return "\n".join([*preface(about), "", *lines, *notes(about), "", *emotion_lines(result), *audits])
 
 
 def latex(result: dict[str, Any]) -> str:

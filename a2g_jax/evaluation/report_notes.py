@@ -54,6 +54,11 @@ def notes(about: dict[str, Any]) -> list[str]:
                 else " The network was trained on another corpus: movement that is rare there has too much weight here."
             )
         )
+    if chance := about.get("emotion_chance"):
+        lines.append(
+            f"Emotion accuracy by chance: {chance['uniform']:.3f} for a random emotion, {chance['commonest']:.3f} for"
+            " always the commonest one; the truth's row is what the classifier itself reaches."
+        )
     return [f"- {note}" for note in lines]
 
 

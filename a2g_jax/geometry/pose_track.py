@@ -1,6 +1,6 @@
 """Motion that has no skeleton: keypoints of a video, or directions of bones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -40,6 +40,10 @@ class PoseTrack:
     def seconds(self) -> float:
         """Duration: each frame lasts ``1 / fps``."""
         return self.frames / self.fps
+
+    def clip(self, start: int, stop: int) -> "PoseTrack":
+        """Frames ``start`` to ``stop`` (exclusive)."""
+        return replace(self, values=self.values[start:stop])
 
 
 def resample_track(track: PoseTrack, fps: float, frames: int) -> PoseTrack:

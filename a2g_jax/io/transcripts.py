@@ -20,8 +20,8 @@ _LONGEST = 1e6
 _SECONDS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{0,12})?s?")
 _PREVIEW = 64
 _LARGEST_FILE = 2**26
-# Tolerance as a share of a frame: frame times and word times are both rounded decimals.
-_SLACK = 1e-6
+#: Tolerance as a share of a frame: frame times and word times are both rounded decimals.
+FRAME_SLACK = 1e-6
 
 
 def read_transcript(path: str | os.PathLike[str]) -> tuple[Word, ...]:
@@ -63,7 +63,7 @@ def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.nd
         raise InputError(f"fps: expected a positive number; got {fps}.")
     result = np.full(max(frames, 0), -1)
     times = np.array([(word.start, word.end) for word in words], np.float64).reshape(-1, 2)
-    first, stop = np.clip(np.ceil(times * fps - _SLACK), 0, frames).astype(np.int64).T
+    first, stop = np.clip(np.ceil(times * fps - FRAME_SLACK), 0, frames).astype(np.int64).T
     for index in np.argsort(times[:, 0], kind="stable"):
         result[first[index] : stop[index]] = index
     return result

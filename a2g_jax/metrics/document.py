@@ -21,7 +21,8 @@ _GENERAL = """\
 
 Corpora of keypoints are scored in their own unit; bone directions laid end to end in metres where bone lengths are
 known, otherwise as directions. Onsets in a report come from the corpus's log-mel rows. Emotion accuracy needs a
-classifier trained on motion: `a2g train emotion_classifier --input motion --corpus CORPUS --out RUN`.
+classifier trained on motion: `a2g train emotion_classifier --input motion --corpus CORPUS --out RUN`. Read it beside
+the truth's row and chance, which a report states: where half of the clips are neutral, that answer is right for half.
 
 `a2g evaluate --compare REPORT REPORT ... --out DIR` puts reports side by side, and refuses those of other corpora,
 splits, skeletons, numbers of samples, units, feature networks or classifiers. `--features demo` is the feature network

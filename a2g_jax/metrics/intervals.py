@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 
 class Interval(NamedTuple):
@@ -29,6 +29,22 @@ def bootstrap_mean(values: Float[np.ndarray, " clips"], rng: np.random.Generator
     means = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
     low, high = np.percentile(means, [2.5, 97.5])
     return Interval(float(values.mean()), float(low), float(high), len(values))
+
+
+def bootstrap_ratio(
+    hits: Int[np.ndarray, " groups"], counts: Int[np.ndarray, " groups"], rng: np.random.Generator, draws: int = 2000
+) -> Interval:
+    """Hits of all groups over their counts, with the 95 % interval of the percentile bootstrap over groups.
+
+    The interval of a single group is NaN.
+    """
+    hits, counts = np.asarray(hits, np.float64), np.asarray(counts, np.float64)
+    ratio = float(hits.sum() / counts.sum())
+    if len(hits) == 1:
+        return Interval(ratio, float("nan"), float("nan"), 1)
+    chosen = rng.integers(0, len(hits), (draws, len(hits)))
+    low, high = np.percentile(hits[chosen].sum(axis=1) / counts[chosen].sum(axis=1), [2.5, 97.5])
+    return Interval(ratio, float(low), float(high), len(hits))
 
 
 def bootstrap_difference(

@@ -34,6 +34,8 @@ class Entry:
     """Training settings by preset."""
     poses: tuple[str, ...] = ()
     """Kinds of poses that the model takes (:data:`a2g_jax.geometry.pose_space.WIDTHS`); all if empty."""
+    needs_emotions: bool = False
+    """Whether every recording of the corpus needs an emotion."""
 
     def builder(self) -> Callable[..., Any]:
         """The function that ``build`` names."""

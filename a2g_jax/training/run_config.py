@@ -112,10 +112,14 @@ class RunConfig:
         """The description of a run of a model on a corpus.
 
         Raises:
-            InputError: the model does not take the corpus's kind of poses.
+            InputError: the model does not take the corpus's kind of poses, or needs emotions where some recordings
+                have none.
         """
-        if poses := find_model(model).poses:
-            corpus.require_pose(*poses)
+        entry = find_model(model)
+        if entry.poses:
+            corpus.require_pose(*entry.poses)
+        if entry.needs_emotions:
+            corpus.require_emotions()
         about = {
             "fingerprint": corpus.fingerprint,
             "recipe": corpus.recipe,

@@ -49,6 +49,35 @@ def test_flags(tmp_path, short, capsys):
     np.testing.assert_array_equal(with_fingers.pose[:, :22], corpus.pose)
 
 
+def test_the_corpus_of_emotion_gesture_with_and_without_jitter(tmp_path, short):
+    """The same speech, words, emotions and splits; only poses differ, so the clean corpus scores runs of the other."""
+    command = [
+        "prepare",
+        "talker",
+        "--features",
+        "emotion-gesture",
+        "--minutes",
+        "0.3",
+        "--seed",
+        "5",
+        "--workers",
+        "1",
+    ]
+    assert main([*command, "--out", str(tmp_path / "clean")]) == 0
+    assert main([*command, "--jitter", "1", "--out", str(tmp_path / "noisy")]) == 0
+    clean, noisy = (Corpus.open(tmp_path / name) for name in ("clean", "noisy"))
+    assert (clean.fps, clean.pose.shape[1:], clean.space.kind) == (15.0, (47, 6), "6d")
+    assert clean.space.same_as(noisy.space)
+    assert clean.recordings == noisy.recordings
+    assert clean.splits == noisy.splits
+    for name in ("audio", "waveform", "words", "word_starts", "emotion"):
+        np.testing.assert_array_equal(clean.array(name), noisy.array(name))
+    assert clean.array("words")[clean.array("word_starts")].all()
+    turned = rotations_from_rows(noisy.pose, "6d") @ np.swapaxes(rotations_from_rows(clean.pose, "6d"), -1, -2)
+    degrees = np.degrees(np.arccos(np.clip((np.trace(turned, axis1=-2, axis2=-1) - 1) / 2, -1, 1)))
+    assert 0.3 < np.median(degrees) < 3.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -64,6 +93,8 @@ def test_flags(tmp_path, short, capsys):
         (["talker", "--joints", "all"], "--joints is for recordings"),
         (["folder", ".", "--speakers", "ada"], "--speakers is for 'a2g prepare talker'"),
         (["folder", ".", "--on-demand"], "--on-demand is for 'a2g prepare talker'"),
+        (["talker", "--labelled"], "--labelled is for recordings"),
+        (["folder", ".", "--confidence", "0.5", "--labels", "no.csv"], "no.csv: there is no such file; make it with"),
         (["folder", ".", "--fingers"], "--fingers is for 'a2g prepare talker'"),
     ],
 )

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from a2g_jax.data.splits import Segment, split_recordings
+from a2g_jax.data.splits import Segment, official_splits, split_recordings
 
 NAMES = ("train", "validation", "test")
 frame_counts = st.lists(st.integers(1, 500), min_size=1, max_size=40)
@@ -32,6 +32,26 @@ def test_many_recordings_stay_whole(frames, seed):
         assert [s.recording for s in splits[name]] == sorted(s.recording for s in splits[name])
     held = max(1, round(len(frames) * 0.1))
     assert len(splits["validation"]) == len(splits["test"]) == held
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(1, 500), st.integers(0, 12)), min_size=1, max_size=40), st.integers(0, 5))
+def test_a_group_is_in_one_split(recordings, seed):
+    frames, groups = [count for count, _ in recordings], [str(group) for _, group in recordings]
+    for splits in (
+        split_recordings(frames, seed, groups=groups),
+        official_splits(frames, ["train"] * len(frames), seed, groups),
+    ):
+        assert sum(s.frames for name in NAMES for s in splits[name]) == sum(frames)
+        if len(set(groups)) >= 5:
+            parts = [{groups[s.recording] for s in splits[name]} for name in NAMES]
+            assert sum(len(part) for part in parts) == len(set(groups))
+            assert parts[1]
+
+
+def test_groups_of_one_change_nothing():
+    frames = list(range(10, 40))
+    assert split_recordings(frames, 3, groups=[f"take{n}" for n in frames]) == split_recordings(frames, 3)
 
 
 def test_shares():

@@ -27,7 +27,7 @@ from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import Perceptual, Run, RunConfig
+from a2g_jax.training.run import Perceptual, Run, RunConfig, save_run
 
 
 @pytest.fixture(scope="module")
@@ -357,6 +357,24 @@ def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys)
     assert score(table, "truth", "emotion_accuracy") > 0.7
     assert 0.0 < score(table, "mean pose", "emotion_accuracy") < 1.0
     assert table["about"]["emotion_classifier"] == judge.fingerprint
+    # The truth's matrix, and chance beside it.
+    (truth,) = [row for row in table["rows"] if row["name"] == "truth"]
+    counts = np.array(truth["emotions"]["confusion"])
+    assert counts.sum() == 7 * table["about"]["clips"]
+    assert np.trace(counts) / counts.sum() == pytest.approx(score(table, "truth", "emotion_accuracy"))
+    emotions = [corpus.recordings[segment.recording].emotion for segment in corpus.segments("train")]
+    assert table["about"]["emotion_chance"] == {
+        "uniform": 0.5,
+        "commonest": max(emotions.count(name) for name in ("anger", "neutral")) / len(emotions),
+    }
+    text = markdown(table)
+    assert "## Emotions" in text
+    assert "always the commonest one; the truth's row" in text
+    assert (tmp_path / "report" / "emotions.png") in write_report(table, tmp_path / "report")
+    noisy = dataclasses.replace(config, corpus={**config.corpus, "recipe": {**config.corpus["recipe"], "jitter": 2.0}})
+    save_run(tmp_path / "noisy", dataclasses.replace(judge.run, config=noisy))
+    with pytest.raises(InputError, match="was trained on motion with capture noise of 2 degrees; train it on the same"):
+        load_emotion_judge(tmp_path / "noisy", corpus)
     listens = dataclasses.replace(small, input="audio")
     config = RunConfig.of("emotion_classifier", "tiny", listens, dataclasses.replace(settings, steps=2), corpus)
     train(config, corpus, tmp_path / "ear", resume=False, progress=False)

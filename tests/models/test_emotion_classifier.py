@@ -14,6 +14,7 @@ from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Data
 from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
 from a2g_jax.models.emotion_classifier.model import build, classify
+from a2g_jax.models.emotion_classifier.networks import positions
 from a2g_jax.training.state import joint_loss
 
 LAYOUT = PoseLayout(("a", "b"), ((0, 1),))
@@ -31,12 +32,22 @@ def batch(seed, clips=24):
     return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32), jnp.asarray(emotion, jnp.int32))
 
 
-@pytest.mark.parametrize("source", ["motion", "audio"])
-def test_it_learns_emotions_from_its_input_only(source):
-    config = EmotionClassifierConfig(source, channels=(16, 16), hidden=16, dropout=0.1, clip_frames=20)
+SMALL = {"channels": (16, 16), "hidden": 16, "width": 16, "layers": 2, "heads": 2, "clip_frames": 20}
+
+
+@pytest.mark.parametrize(
+    ("source", "encoder", "rate", "steps"),
+    [
+        ("motion", "convolutions", 5e-3, 120),
+        ("audio", "convolutions", 5e-3, 120),
+        ("motion", "attention", 2e-3, 200),
+    ],
+)
+def test_it_learns_emotions_from_its_input_only(source, encoder, rate, steps):
+    config = EmotionClassifierConfig(source, encoder, dropout=0.1, **SMALL)
     model = build(config, DATA)
     params = model.init(jax.random.key(0))
-    optimiser = optax.adam(5e-3)
+    optimiser = optax.adam(rate)
 
     @jax.jit
     def step(params, state, clips, key):
@@ -45,7 +56,7 @@ def test_it_learns_emotions_from_its_input_only(source):
         return optax.apply_updates(params, updates), state
 
     state = optimiser.init(params)
-    for number in range(120):
+    for number in range(steps):
         params, state = step(params, state, batch(number), jax.random.key(number))
     held = batch(10_000, clips=60)
 
@@ -70,6 +81,28 @@ def test_dropout_acts_in_training_only():
     }
     assert (len(losses), len(held)) == (3, 1)
     assert classify(config, DATA, params, clips).shape == (24, 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"encoder": "recurrent"}, "--encoder: expected 'attention' or 'convolutions'; got 'recurrent'"),
+        ({"width": 20, "heads": 8}, "--width: expected an even multiple of --heads; got 20 with 8 heads"),
+        ({"layers": 0}, "0 layers, of which one or more"),
+        ({"input": "words"}, "--input: expected 'motion' or 'audio'"),
+    ],
+)
+def test_wrong_settings(changes, message):
+    with pytest.raises(InputError, match=message):
+        EmotionClassifierConfig(**changes)
+
+
+def test_positions_differ_and_are_bounded():
+    values = positions(60, 16)
+    assert values.shape == (60, 16)
+    assert float(jnp.abs(values).max()) <= 1.0
+    distance = jnp.linalg.norm(values[:, None] - values[None], axis=-1) + 10.0 * jnp.eye(60)
+    assert float(distance.min()) > 0.1
 
 
 def test_one_emotion_is_refused():

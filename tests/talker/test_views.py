@@ -10,6 +10,7 @@ from a2g_jax.data.corpus_writer import prepare_recording
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import resample
+from a2g_jax.geometry.retarget import find_rig, retarget, upper_body_skeleton
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.views import directions as ted
@@ -63,14 +64,24 @@ def test_upper_body_is_where_the_talker_is(take):
     np.testing.assert_allclose(view.root, source.positions()[:, names.index("Spine3")], atol=2e-6)
 
 
+def test_a_recorded_rig_has_the_same_joints_and_rotations(take):
+    """Generated talk as BEAT shows it is what retargeting to the upper body makes of the talker."""
+    view, rig = beat.upper_body(take.motion, 30.0), find_rig(take.motion)
+    same = retarget(take.motion, upper_body_skeleton(rig), source=rig)
+    assert view.skeleton.same_tree(same.skeleton)
+    turning = [joint for joint, name in enumerate(beat.SOURCES) if name]
+    np.testing.assert_allclose(view.rotations[:, turning], same.rotations[:, turning], atol=1e-4)
+
+
 def test_metacarpals_lie_in_the_palm_and_do_not_move(take):
     view = beat.upper_body(take.motion)
     places = slow_positions(view)
     for side in SIDES:
-        hand = view.skeleton.index(f"{side}Hand")
-        for finger in "RPI":
-            joint = view.skeleton.index(f"{side}Hand{finger}")
-            assert view.skeleton.parents[joint] in (hand, view.skeleton.index(f"{side}HandR"))
+        word = {"L": "Left", "R": "Right"}[side]
+        hand = view.skeleton.index(f"{word}Hand")
+        for finger in ("Ring", "Pinky", "Index"):
+            joint = view.skeleton.index(f"{word}Hand{finger}")
+            assert view.skeleton.parents[joint] in (hand, view.skeleton.index(f"{word}HandRing"))
             np.testing.assert_array_equal(view.rotations[:, joint], np.broadcast_to(np.eye(3), (view.frames, 3, 3)))
             knuckle = np.linalg.norm(places[:, joint + 1] - places[:, hand], axis=1)
             assert np.all(np.linalg.norm(places[:, joint] - places[:, hand], axis=1) < 0.4 * knuckle)
@@ -79,14 +90,15 @@ def test_metacarpals_lie_in_the_palm_and_do_not_move(take):
 def test_ends_are_finger_tips(take):
     view = beat.upper_body(take.motion)
     owners = sorted(view.skeleton.names[joint] for joint, _ in view.skeleton.ends)
-    assert owners == sorted(["Neck1", *(f"{side}Hand{finger}3" for side in "LR" for finger in "MRPIT")])
+    fingers = ("Middle", "Ring", "Pinky", "Index", "Thumb")
+    assert owners == sorted(["Neck1", *(f"{side}Hand{finger}3" for side in ("Left", "Right") for finger in fingers)])
 
 
 def test_pose_values_are_the_first_two_columns(take):
     view = beat.upper_body(take.motion)
     values = beat.pose_values(view)
     assert values.shape == (120, 282)
-    elbow = view.skeleton.index("RArm1")
+    elbow = view.skeleton.index("RightForeArm")
     np.testing.assert_array_equal(values[7, 6 * elbow : 6 * elbow + 3], view.rotations[7, elbow, :, 0])
     np.testing.assert_array_equal(values[7, 6 * elbow + 3 : 6 * elbow + 6], view.rotations[7, elbow, :, 1])
 
@@ -94,14 +106,7 @@ def test_pose_values_are_the_first_two_columns(take):
 def test_order_is_that_of_beat(shared):
     real = read_bvh(shared / "beat" / "2_scott_0_1_1.bvh")
 
-    def short(name):
-        for long, letter in (("Right", "R"), ("Left", "L")):
-            name = name.replace(long, letter)
-        for finger in ("Middle", "Ring", "Pinky", "Index", "Thumb"):
-            name = name.replace(f"Hand{finger}", f"Hand{finger[0]}")
-        return name.replace("ForeArm", "Arm1")
-
-    names = [short(name) for name in real.skeleton.names]
+    names = list(real.skeleton.names)
     order = [names.index(name) for name in beat.UPPER_BODY_JOINTS]
     assert order == sorted(order)
     for joint, above in enumerate(beat.UPPER_BODY_PARENTS[1:], start=1):
@@ -112,7 +117,8 @@ def test_order_is_that_of_beat(shared):
     # Rest poses agree: bones of the same side point the same way, within what bodies differ by.
     ours = beat.upper_body_skeleton(talk(2.0, 0, fps=5.0, fingers=True).motion.skeleton)
     for joint, name in enumerate(ours.names):
-        if joint and name.startswith(("RHand", "LHand", "RArm", "LArm")) and name[-1] not in "RPI1":
+        arm = name.endswith("Arm") and "Fore" not in name
+        if joint and (arm or ("Hand" in name and name[-1] in "d23")):
             a, b = ours.offsets[joint], real.skeleton.offsets[order[joint]]
             cosine = a @ b / np.linalg.norm(a) / np.linalg.norm(b)
             assert cosine > 0.7, name

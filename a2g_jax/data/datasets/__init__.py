@@ -12,6 +12,7 @@ from a2g_jax.data.data_set_names import MODULES, all_names, is_reference
 from a2g_jax.data.data_set_names import NAMES as NAMES
 from a2g_jax.data.datasets.source import SPLITS as SPLITS
 from a2g_jax.data.datasets.source import DataSet as DataSet
+from a2g_jax.data.datasets.source import LabelRule as LabelRule
 from a2g_jax.data.datasets.source import Take as Take
 from a2g_jax.errors import InputError
 from a2g_jax.plugins import DATA_SETS, describe, entry_points_of, load_entry_point, load_object

@@ -12,10 +12,10 @@ from a2g_jax.data.datasets.beat_take import LANGUAGES, describe_face, emotion, r
 from a2g_jax.data.datasets.cut import cut
 from a2g_jax.data.datasets.named_files import files_by_name, list_files, require
 from a2g_jax.data.datasets.source import DataSet, Take
+from a2g_jax.data.datasets.word_times import words_of_audio
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
-from a2g_jax.io.textgrid import read_words
 from a2g_jax.recording import Recording
 
 _EXPECTED = (
@@ -44,7 +44,8 @@ def find(folder: Path) -> list[Take]:
         sources = tuple(str(groups[name][suffix]) for suffix in _SUFFIXES if suffix in groups[name])
         for part in parts(take.speaker_id, take.kind, take.first, take.last):
             spec = {"start": part.start, "end": part.end} if part.label else {}
-            takes.append(Take(f"{name}_{part.label}" if part.label else name, sources, part.split, spec))
+            # Halves of a recording are a group: also a split by the seed keeps them together.
+            takes.append(Take(f"{name}_{part.label}" if part.label else name, sources, part.split, spec, name))
     return takes
 
 
@@ -78,7 +79,8 @@ def read(take: Take, sample_rate: int) -> Recording:
         "scenario": "conversation" if name.kind % 2 else "speech",
         "speaker_id": name.speaker_id,
     }
-    words = read_words(files[".textgrid"]) if ".textgrid" in files else ()
+    audio = read_audio(files[".wav"], sample_rate)
+    words = words_of_audio(files[".textgrid"], len(audio) / sample_rate) if ".textgrid" in files else ()
     if ".textgrid" in files and (phones := read_phones(files[".textgrid"])):
         annotations["phones"] = phones
     if ".csv" in files:
@@ -89,7 +91,7 @@ def read(take: Take, sample_rate: int) -> Recording:
         annotations["face"] = describe_face(files[".json"], take.spec.get("start", 0.0))
     recording = Recording(
         name=take.name,
-        audio=read_audio(files[".wav"], sample_rate),
+        audio=audio,
         sample_rate=sample_rate,
         motion=read_bvh(files[".bvh"]),
         words=words,

@@ -24,9 +24,9 @@ from a2g_jax.data.datasets.csv_tables import read_columns
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, check_folder, files_with, unique_names
 from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
 from a2g_jax.data.datasets.source import DataSet, Take
+from a2g_jax.data.datasets.word_times import words_of_audio
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
-from a2g_jax.io.textgrid import read_words
 from a2g_jax.io.untrusted import read_npz
 from a2g_jax.recording import Recording
 
@@ -74,7 +74,7 @@ def read(take: Take, sample_rate: int) -> Recording:
     Raises:
         InputError: a file is missing or damaged, or an array has another shape or rate than BEAT2's.
     """
-    path, audio, *extra = take.sources
+    path, sound, *extra = take.sources
     grid, meanings = (next((file for file in extra if file.endswith(end)), "") for end in (".TextGrid", ".txt"))
     arrays = read_npz(path, _ARRAYS)
     poses = float_array(arrays["poses"], ((55, 3), (165,)), f"{path}, poses")
@@ -92,12 +92,13 @@ def read(take: Take, sample_rate: int) -> Recording:
     if meanings:
         annotations["semantic"] = read_semantics(Path(meanings))
     match = _NAME.fullmatch(Path(path).stem)
+    audio = read_audio(sound, sample_rate)
     return Recording(
         name=take.name,
-        audio=read_audio(audio, sample_rate),
+        audio=audio,
         sample_rate=sample_rate,
         motion=motion,
-        words=read_words(grid) if grid else (),
+        words=words_of_audio(grid, len(audio) / sample_rate) if grid else (),
         speaker=match[1] if match else "",
         emotion=emotion(int(match[2]), int(match[3]), int(match[4])) if match else "",
         sources=take.sources,

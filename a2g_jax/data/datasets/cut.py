@@ -1,13 +1,15 @@
 """A piece of a recording."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from a2g_jax.errors import InputError
-from a2g_jax.recording import Recording, Word
+from a2g_jax.recording import PoseRecording, Recording, Word
+
+AnyRecording = TypeVar("AnyRecording", Recording, PoseRecording)
 
 
-def cut(recording: Recording, start: float, end: float | None = None) -> Recording:
+def cut(recording: AnyRecording, start: float, end: float | None = None) -> AnyRecording:
     """The recording from ``start`` to ``end`` (None: to its end), seconds, with times relative to ``start``.
 
     Words and timed labels (annotations that are lists of entries with ``start`` and ``end``) are cut at both ends. The

@@ -12,6 +12,30 @@ SPLITS = ("train", "validation", "test")
 
 
 @dataclass(frozen=True)
+class LabelRule:
+    """Which windows of a table of emotions count (:mod:`a2g_jax.data.emotion_table`)."""
+
+    confidence: float = 0.9
+    """Least probability of a window's emotion."""
+    emotions: tuple[str, ...] = ()
+    """Emotions that count; empty for all."""
+    table: str = ""
+    """File name of the table in the data set's folder; empty where the user names one."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of a recording, with its label of a table of emotions (:mod:`a2g_jax.data.emotion_table`)."""
+
+    start: float
+    """Seconds from the start of the recording."""
+    end: float
+    emotion: str
+    confidence: float
+    """Mean probability of the emotion over the labelled windows in it."""
+
+
+@dataclass(frozen=True)
 class Take:
     """A recording of a data set, found but not read."""
 
@@ -23,6 +47,10 @@ class Take:
     """``"train"``, ``"validation"`` or ``"test"`` by the official split; empty without one."""
     spec: dict[str, Any] = field(default_factory=dict)
     """Further arguments of reading it, as JSON values: a clip's index, times."""
+    group: str = ""
+    """Takes of one group, such as pieces of one recording, are in the same part of a split by the seed."""
+    piece: Piece | None = None
+    """The stretch that is prepared; None for all of it."""
 
 
 @dataclass(frozen=True)
@@ -42,3 +70,5 @@ class DataSet:
     """Default representation of its poses."""
     about: str = ""
     """Where to get it, its licence, its layout on disk, and the official split."""
+    labels: LabelRule | None = None
+    """Of data sets whose emotions are in a table; None for others."""

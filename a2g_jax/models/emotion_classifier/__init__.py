@@ -3,4 +3,9 @@
 from a2g_jax.models.emotion_classifier.config import PRESETS, EmotionClassifierConfig
 from a2g_jax.models.entry import Entry
 
-ENTRY = Entry(config=EmotionClassifierConfig, presets=PRESETS, build="a2g_jax.models.emotion_classifier.model:build")
+ENTRY = Entry(
+    config=EmotionClassifierConfig,
+    presets=PRESETS,
+    build="a2g_jax.models.emotion_classifier.model:build",
+    needs_emotions=True,
+)

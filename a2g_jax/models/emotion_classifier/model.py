@@ -1,40 +1,19 @@
 """The emotion classifiers as a record of pure functions."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import optax
-from flax import linen as nn
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Classifier, Data, Model, Params, Stage, Summary, Update
 from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
+from a2g_jax.models.emotion_classifier.networks import AttentionEncoder, ClipClassifier
 from a2g_jax.models.entry import NO_SAMPLING, NoSampling
-from a2g_jax.nn.tcn import TCN, receptive_halo
-
-
-class ClipClassifier(nn.Module):
-    """Residual blocks over time; mean and standard deviation over the clip; two linear layers."""
-
-    channels: Sequence[int]
-    hidden: int
-    kernel_size: int
-    dropout: float
-    classes: int
-
-    @nn.compact
-    def __call__(self, x: Float[Array, "B T C"], deterministic: bool = True) -> Float[Array, "B K"]:
-        x = TCN(self.channels, self.kernel_size, self.dropout)(x, deterministic)
-        # The epsilon keeps the gradient of the root finite where a channel is constant.
-        deviation = jnp.sqrt(jnp.var(x, axis=1) + 1e-6)
-        pooled = jnp.concatenate([jnp.mean(x, axis=1), deviation], axis=-1)
-        hidden = nn.Dropout(self.dropout)(nn.relu(nn.Dense(self.hidden)(pooled)), deterministic=deterministic)
-        logits: Float[Array, "B K"] = nn.Dense(self.classes)(hidden)
-        return logits
+from a2g_jax.nn.tcn import receptive_halo
 
 
 def classify(
@@ -52,7 +31,12 @@ def classify(
 
 
 def _network(config: EmotionClassifierConfig, data: Data) -> ClipClassifier:
-    return ClipClassifier(config.channels, config.hidden, config.kernel_size, config.dropout, len(data.emotions))
+    attention = None
+    if config.encoder == "attention":
+        attention = AttentionEncoder(config.width, config.layers, config.heads, config.dropout)
+    return ClipClassifier(
+        config.channels, config.hidden, config.kernel_size, config.dropout, len(data.emotions), attention
+    )
 
 
 def build(config: EmotionClassifierConfig, data: Data, sampling: NoSampling = NO_SAMPLING) -> Model:
@@ -106,6 +90,8 @@ def build(config: EmotionClassifierConfig, data: Data, sampling: NoSampling = NO
         return {"confidence": jnp.take_along_axis(probabilities, batch.emotion[:, None], axis=1)[:, 0]}
 
     halo = receptive_halo(len(config.channels), config.kernel_size)
+    if config.encoder == "attention":
+        halo = config.clip_frames
     return Model(
         "emotion_classifier",
         config,

@@ -21,9 +21,9 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.recording import Recording
 from a2g_jax.talker.views.landmarks import require_fingers
 
-_FINGERS = {"M": "Middle", "R": "Ring", "P": "Pinky", "I": "Index", "T": "Thumb"}
-_METACARPALS = ("R", "P", "I")
-_PARENTS = {"P": "R", "T": "I"}
+_FINGERS = ("Middle", "Ring", "Pinky", "Index", "Thumb")
+_METACARPALS = ("Ring", "Pinky", "Index")
+_PARENTS = {"Pinky": "Ring", "Thumb": "Index"}
 """In BEAT's tree the little finger's parent is the ring finger's metacarpal joint, the thumb's the index finger's."""
 _METACARPAL = (0.03, 0.6, 0.55)
 """Place of a metacarpal joint between wrist and knuckle, as shares along each axis: BEAT's, about."""
@@ -32,20 +32,20 @@ _METACARPAL = (0.03, 0.6, 0.55)
 def _tree() -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
     """Names, parents, and the talker's joint that each takes its rotation from ("" for metacarpals)."""
     rows = [("Spine", "", "Spine3"), ("Neck", "Spine", "Neck"), ("Neck1", "Neck", "Head")]
-    for side in ("R", "L"):
-        arm = [("Shoulder", "Collar"), ("Arm", "Shoulder"), ("Arm1", "Elbow"), ("Hand", "Wrist")]
+    for side, word in (("R", "Right"), ("L", "Left")):
+        arm = [("Shoulder", "Collar"), ("Arm", "Shoulder"), ("ForeArm", "Elbow"), ("Hand", "Wrist")]
         above = "Spine"
         for name, source in arm:
-            rows.append((side + name, above, f"{side}_{source}"))
-            above = side + name
+            rows.append((word + name, above, f"{side}_{source}"))
+            above = word + name
         hand = above
-        for letter, finger in _FINGERS.items():
-            above = hand + _PARENTS.get(letter, "")
-            if letter in _METACARPALS:
-                rows.append((hand + letter, above, ""))
-                above = hand + letter
+        for finger in _FINGERS:
+            above = hand + _PARENTS.get(finger, "")
+            if finger in _METACARPALS:
+                rows.append((hand + finger, above, ""))
+                above = hand + finger
             for number in (1, 2, 3):
-                name = f"{hand}{letter}{number}"
+                name = f"{hand}{finger}{number}"
                 rows.append((name, above, f"{side}_{finger}{number}"))
                 above = name
     names = tuple(name for name, _, _ in rows)
@@ -54,9 +54,10 @@ def _tree() -> tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
 
 
 UPPER_BODY_JOINTS, UPPER_BODY_PARENTS, SOURCES = _tree()
-"""BEAT's names of the 47 joints in BEAT's order, their parents, and the talker's joint for each.
+"""Names and order of the 47 joints in BEAT's files, their parents, and the talker's joint for each.
 
-``SOURCES`` is empty for the six metacarpal joints, which the talker does not have.
+They are those of :func:`~a2g_jax.geometry.retarget.upper_body_skeleton`, so generated and recorded corpora have the
+same joints. ``SOURCES`` is empty for the six metacarpal joints, which the talker does not have.
 """
 
 

@@ -7,12 +7,16 @@ from bvh_trees import TREES, check_motion, check_sound, put, tree, write_motion,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from a2g_jax.cli import main
+from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.datasets import beat
 from a2g_jax.data.datasets.beat_split import Part, parts
 from a2g_jax.data.datasets.beat_take import describe_face, emotion, read_emotions, read_semantics
 from a2g_jax.errors import InputError
 from a2g_jax.io.textgrid import write_words
+from a2g_jax.io.words import word_id
 from a2g_jax.recording import Word
+from a2g_jax.talker.views.upper_body import UPPER_BODY_JOINTS
 
 WORDS = (Word("the", 0.25, 0.5), Word("first", 0.5, 1.0), Word("thing", 1.25, 1.75))
 PHONES = (Word("DH", 0.25, 0.3), Word("AH0", 0.3, 0.5), Word("F", 0.5, 1.0))
@@ -100,6 +104,7 @@ def test_halves_are_cut_at_thirty_seconds(tmp_path):
         ("5_stewart_0_65_65_b", "validation"),
     ]
     first, second = (beat.read(take, 16000) for take in takes)
+    assert takes[0].group == takes[1].group
     assert (first.motion.frames, second.motion.frames) == (450, 22)
     np.testing.assert_allclose(second.motion.positions(), motion.positions[450:], atol=2e-5)
     check_sound(second.audio, sound[30 * 16000 :])
@@ -107,6 +112,37 @@ def test_halves_are_cut_at_thirty_seconds(tmp_path):
     assert second.words == (Word("b", 0.0, 0.5),)
     assert [(e["start"], e["end"]) for e in second.annotations["semantic"]] == [(0.0, 1.0)]
     assert (second.name, second.emotion, second.annotations["face"]["offset"]) == (takes[1].name, "happiness", 30.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), r"1_wayne_0_9_9\.TextGrid: has no words; align the transcript again, or remove the file if nothing is"),
+        (
+            (Word("late", 1.5, 2.2),),
+            r"TextGrid: 'late' ends at 2\.20 s, but the audio lasts 0\.50 s; take the TextGrid",
+        ),
+    ],
+)
+def test_textgrids_that_do_not_belong_to_the_audio(tmp_path, words, message):
+    write_take(tmp_path, "1_wayne_0_9_9", seconds=0.5, fps=15.0, labels=False)
+    write_words(tmp_path / "1" / "1_wayne_0_9_9.TextGrid", words, 3.0)
+    with pytest.raises(InputError, match=message):
+        beat.read(beat.find(tmp_path)[0], 16000)
+
+
+def test_an_empty_textgrid_is_one_line(tmp_path):
+    write_take(tmp_path, "1_wayne_0_9_9", seconds=0.5, fps=15.0, labels=False)
+    put(tmp_path / "1" / "1_wayne_0_9_9.TextGrid", b"")
+    with pytest.raises(InputError, match=r"1_wayne_0_9_9\.TextGrid") as caught:
+        beat.read(beat.find(tmp_path)[0], 16000)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_word_may_end_a_moment_after_the_audio(tmp_path):
+    write_take(tmp_path, "1_wayne_0_9_9", seconds=0.5, fps=15.0, labels=False)
+    write_words(tmp_path / "1" / "1_wayne_0_9_9.TextGrid", [Word("last", 0.3, 0.8)], 1.0)
+    assert beat.read(beat.find(tmp_path)[0], 16000).words == (Word("last", 0.3, 0.8),)
 
 
 def test_emotions_by_sequence_number():
@@ -161,6 +197,13 @@ def test_split_is_that_of_the_readme():
     assert split(5, (0, 64, 65)) == [""]
     assert split(1, (2, 1, 1)) == [""]
     assert split(31, (0, 1, 1)) == [""]
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(1, 30), st.integers(0, 1), st.integers(1, 118))
+def test_no_recording_is_both_for_training_and_held_out(speaker, kind, number):
+    found = {part.split for part in parts(speaker, kind, number, number)}
+    assert "train" not in found or found == {"train"}
 
 
 def test_order_is_by_number(tmp_path):
@@ -257,6 +300,19 @@ def test_real_take(shared, tmp_path):
     (take,) = beat.find(tmp_path)
     assert (take.name, take.split) == ("2_scott_0_1_1", "test")
     recording = beat.read(take, 16000)
+    # The task of EmotionGesture: 47 joints at 15 frames a second, words at their start frames.
+    command = ["prepare", "beat", str(tmp_path), "--features", "emotion-gesture", "--workers", "1", "--labelled"]
+    assert main([*command, "--out", str(tmp_path / "corpus")]) == 2
+    assert main([*command, "--random-split", "--out", str(tmp_path / "corpus")]) == 0
+    corpus = Corpus.open(tmp_path / "corpus")
+    assert (corpus.fps, corpus.emotions, corpus.pose.shape) == (15.0, ("neutral",), (956, 47, 6))
+    assert corpus.skeleton.names == UPPER_BODY_JOINTS
+    words, starts = corpus.array("words"), corpus.array("word_starts")
+    assert words[starts].all()
+    assert (words[21], starts[21], starts[22]) == (word_id("the"), True, True)  # at 1.42 and 1.52 s
+    ends = {name: [(s.start, s.stop) for s in corpus.splits[name]] for name in ("train", "validation", "test")}
+    assert ends["train"][0][1] == ends["validation"][0][0] < ends["validation"][0][1] == ends["test"][0][0]
+    assert len(corpus.waveform) == round(956 * 16000 / 15)
     assert (recording.speaker, recording.emotion) == ("scott", "neutral")
     assert recording.motion.skeleton.names == tree(TREES["beat"])[0]
     assert (recording.motion.frames, recording.motion.fps) == (956, 15.0)

@@ -1,0 +1,75 @@
+"""Confusion matrices of classifiers as JSON, Markdown and a picture."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from a2g_jax.io.files import atomic_path, make_folder
+
+
+def write_confusion(result: dict[str, Any], out: Path) -> list[Path]:
+    """Write ``confusion.json``, ``confusion.md`` and, where Matplotlib is installed, ``confusion.png``.
+
+    Args:
+        result: of :func:`a2g_jax.evaluation.confusion.classify_split`.
+    """
+    make_folder(out)
+    written = []
+    for name, text in (("confusion.json", json.dumps(result, indent=1) + "\n"), ("confusion.md", markdown(result))):
+        with atomic_path(out / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        written.append(out / name)
+    try:
+        import matplotlib  # noqa: F401 - optional
+    except ImportError:
+        return written
+    from a2g_jax.viz.confusion import Panel, save_confusion
+
+    panels = [
+        Panel(
+            f"{name}, {one['input']}: {100 * one['accuracy']['mean']:.1f} %",
+            one["emotions"],
+            np.array(one["confusion"]),
+        )
+        for name, one in result["classifiers"].items()
+    ]
+    save_confusion(out / "confusion.png", panels)
+    return [*written, out / "confusion.png"]
+
+
+def markdown(result: dict[str, Any]) -> str:
+    """A table of accuracies, and the matrix of each classifier."""
+    about = result["about"]
+    lines = [
+        f"# Classifiers of emotions on the {about['split']} split",
+        "",
+        f"Corpus {about['corpus'][:16]} ({about['recipe'].get('reader')}); package {about['package']}.",
+        "",
+        "| | input | clips | recordings | accuracy | balanced | uniform | commonest | shuffled |",
+        "|" + " --- |" * 9,
+    ]
+    for name, one in result["classifiers"].items():
+        accuracy, chance = one["accuracy"], one["chance"]
+        interval = "" if accuracy["low"] is None else f" [{accuracy['low']:.3f}, {accuracy['high']:.3f}]"
+        cells = [name, one["input"], str(one["clips"]), str(one["recordings"]), f"{accuracy['mean']:.3f}{interval}"]
+        cells += [
+            f"{value:.3f}" for value in (one["balanced"], *(chance[k] for k in ("uniform", "commonest", "shuffled")))
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        "Brackets hold 95 % intervals over recordings (bootstrap). Balanced is the mean over emotions. The last three",
+        "columns are chance: a random emotion, always the commonest one, the classifier's own answers in random order.",
+    ]
+    for name, one in result["classifiers"].items():
+        names = one["emotions"]
+        lines += ["", f"## {name}", "", "| is \\ classified as | " + " | ".join(names) + " | recall |"]
+        lines.append("|" + " --- |" * (len(names) + 2))
+        for emotion, counts, recall in zip(names, one["confusion"], one["recall"], strict=True):
+            share = "-" if recall is None else f"{recall:.3f}"
+            lines.append(f"| {emotion} | " + " | ".join(str(count) for count in counts) + f" | {share} |")
+        if one["left_out"]:
+            lines += ["", f"{one['left_out']} clips are left out: the classifier does not have their emotion."]
+    return "\n".join([*lines, ""])
