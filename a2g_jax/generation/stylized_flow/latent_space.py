@@ -1,6 +1,7 @@
 """Latents of a trained flow: those of clips, and generation with them (Stylized flow, ECCV 2022, Sec. 4.5)."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +13,8 @@ from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.controls import percentiles
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
-from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive
+from a2g_jax.generation.stylized_flow.fit import Fitted, fit
+from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive, within_training
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
@@ -76,17 +78,24 @@ class FlowSpace:
         """
         config = self.run.config
         motion = on_skeleton(motion, config.skeleton, config.fps, name)
-        frames, features = motion.frames, None
-        if audio is not None:
-            sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
-            # The same tolerance as in the preparation of corpora.
-            if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
-                raise InputError(
-                    f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
-                )
-            frames = min(frames, round(sound * config.fps))
-            features = log_mel(audio, config.mel, config.fps, frames)
+        frames, features = self._speech(motion, audio, name)
         return self.encode_rows(represent(motion, config.space.kind, name)[0][:frames], features)
+
+    def _speech(
+        self, motion: Motion, audio: Float[np.ndarray, " N"] | None, name: str
+    ) -> tuple[int, Float[np.ndarray, "T bands"] | None]:
+        """Frames of a clip that have speech, and log-mel rows of these; all frames and None without audio."""
+        if audio is None:
+            return motion.frames, None
+        config = self.run.config
+        sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
+        # The same tolerance as in the preparation of corpora.
+        if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
+            raise InputError(
+                f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
+            )
+        frames = min(motion.frames, round(sound * config.fps))
+        return frames, log_mel(audio, config.mel, config.fps, frames)
 
     def encode_rows(
         self, rows: Rows, features: LogMel | None = None, before: Earlier | None = None
@@ -140,15 +149,42 @@ class FlowSpace:
     ) -> Style:
         """All that the run keeps of a clip's style: its latents, and code and mean controls if the run has these.
 
-        Arguments and errors of :meth:`encode` and :class:`~a2g_jax.generation.stylized_flow.style.Style`.
+        The clip is brought into the range of the run's training motion first
+        (:func:`a2g_jax.generation.stylized_flow.fit.fit`), and so are its latents; :meth:`encode` gives those of the clip
+        as it is.
+
+        Arguments and errors of :meth:`encode`, :func:`~a2g_jax.generation.stylized_flow.fit.fit` and
+        :class:`~a2g_jax.generation.stylized_flow.style.Style`.
         """
-        latents = self.encode(motion, audio, name)
-        moved = on_skeleton(motion, self.run.config.skeleton, self.run.config.fps, name)
-        rows = represent(moved, self.run.config.space.kind, name)[0][: len(latents)]
+        return self.fitted_style(fit(motion, self.run, name), audio, mode, share, name)[0]
+
+    def fitted_style(
+        self,
+        clip: Fitted,
+        audio: Float[np.ndarray, " N"] | None = None,
+        mode: str = "repeat",
+        share: float = 1.0,
+        name: str = "the clip",
+    ) -> tuple[Style, Fitted]:
+        """The style of a fitted clip, and the clip with the figures of its latents."""
+        frames, features = self._speech(clip.motion, audio, name)
+        rows = clip.rows[:frames]
+        own = self.encode_rows(rows, features)
+        means = self.run.summary.get("latent_mean")
+        latents = within_training(own, None if means is None else np.asarray(means))
+        sizes = np.sqrt(np.square(own).mean(axis=1))
+        factor = float(np.sqrt(np.square(latents).mean() / max(float(np.square(own).mean()), 1e-12)))
         controls = None
         if self._names:
-            controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0)
-        return Style(latents, mode, share, self._style_code(rows), controls)
+            # Of the clip itself, not of its pose within range: they are requested as percentiles.
+            places = represent(clip.motion, self.run.config.space.kind, name)[0][:frames]
+            controls = np.asarray(self._controls(np.asarray(places, np.float32)[None]))[0].mean(axis=0)
+        measured = replace(
+            clip,
+            distance=replace(clip.distance, code=float(np.median(sizes))),
+            adapted=replace(clip.adapted, latents=factor),
+        )
+        return Style(latents, mode, share, self._style_code(rows), controls), measured
 
     def generate(
         self,
