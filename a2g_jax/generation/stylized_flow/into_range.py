@@ -60,7 +60,9 @@ def into_range(z: Float[np.ndarray, "T C"], ranges: Ranges) -> Moved:
     """
     width = min(ranges.frames, len(z))
     starts = range(0, len(z) - width + 1, max(1, width // 2))
-    lowest, highest = (np.stack([edge(z[first : first + width], axis=0) for first in starts]) for edge in (np.min, np.max))
+    lowest, highest = (
+        np.stack([edge(z[first : first + width], axis=0) for first in starts]) for edge in (np.min, np.max)
+    )
     middle, half = (0.5 * (highest + lowest)).mean(axis=0), (0.5 * (highest - lowest)).mean(axis=0)
     middles = np.percentile(0.5 * (ranges.high + ranges.low), _MIDDLES, axis=0)
     widest = np.percentile(0.5 * (ranges.high - ranges.low), _WIDEST, axis=0)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,10 +12,11 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.controls import percentiles
-from a2g_jax.generation.engine import WINDOW
+from a2g_jax.generation.engine import LANES, WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
-from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive, within_training
+from a2g_jax.generation.stylized_flow.requests import matching_requests
+from a2g_jax.generation.stylized_flow.style import Style, drive, within_training
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
@@ -24,6 +26,9 @@ from a2g_jax.training.run import Run
 Rows = Float[np.ndarray, "T R D"]
 Earlier = Float[np.ndarray, "S R D"]
 LogMel = Float[np.ndarray, "F bands"]
+
+#: Seconds of a speech, and the seed of the samples, that the requests of a style are found on.
+_MATCHED, _MATCHED_SEED = 30.0, 20_220_701
 
 
 class FlowSpace:
@@ -178,13 +183,15 @@ class FlowSpace:
         if self._names:
             # Of the clip itself, not of its pose within range: they are requested as percentiles.
             places = represent(clip.motion, self.run.config.space.kind, name)[0][:frames]
-            controls = np.asarray(self._controls(np.asarray(places, np.float32)[None]))[0].mean(axis=0)
+            controls = self._mean_controls(places)
         measured = replace(
             clip,
             distance=replace(clip.distance, code=float(np.median(sizes))),
             adapted=replace(clip.adapted, latents=factor),
         )
-        return Style(latents, mode, share, self._style_code(rows), controls), measured
+        # The more the latents had to shrink, the less they hold of the clip's style.
+        trust = float(np.sqrt(min(factor, 1.0)))
+        return Style(latents, mode, share, self._style_code(rows), controls, trust), measured
 
     def generate(
         self,
@@ -238,21 +245,50 @@ class FlowSpace:
     ) -> Iterator[Rows]:
         """Yield the rows of :meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
         earlier = None if seed_rows is None else self._last(seed_rows)
-        given = {"seed_poses": earlier, "latents": drive(style, len(features), self.channels)}
+        if style is not None and style.requests is None:
+            style = self.match(style, features)
+        yield from self.generator.rows(features, samples, seed, **self._given(style, len(features), earlier))
+
+    def match(self, style: Style, features: LogMel) -> Style:
+        """The style with requests for one speech, so that the hands of its motion get near the clip's height, speed and
+        radius; as it is for a run without controls.
+
+        Requests are found on the first half minute of the speech, with samples that depend on nothing else.
+
+        Args:
+            features: of the speech, as in :meth:`rows`.
+        """
+        if style.controls is None or style.share == 0:
+            return style
+        heard = features[: round(_MATCHED * self.run.config.fps)]
+        plain = self.mean_controls(heard)
+        share = style.share * self.run.config.sampling_settings.style_gain
+        goal = plain + share * (style.controls - plain)
+        training = np.asarray(self.run.summary["control_mean"], np.float64)
+        draw = lambda requests: self.mean_controls(heard, replace(style, requests=requests))  # noqa: E731
+        return replace(style, requests=matching_requests(draw, goal, training))
+
+    def mean_controls(self, features: LogMel, style: Style | None = None) -> Float[np.ndarray, " K"]:
+        """Mean controls of samples for a speech, metres and m/s."""
+        drawn = self.generator.rows(features, LANES, _MATCHED_SEED, **self._given(style, len(features), None))
+        return np.mean([self._mean_controls(rows) for rows in drawn], axis=0)
+
+    def _mean_controls(self, rows: Rows) -> Float[np.ndarray, " K"]:
+        return np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0, dtype=np.float64)
+
+    def _given(self, style: Style | None, frames: int, earlier: Earlier | None) -> dict[str, Any]:
+        given: dict[str, Any] = {"seed_poses": earlier, "latents": drive(style, frames, self.channels)}
         if style is not None and style.share > 0:
-            given |= {"style": style.code, "controls": self._requested(style, len(features))}
-        yield from self.generator.rows(features, samples, seed, **given)
+            given |= {"style": style.code, "controls": self._requested(style, frames)}
+        return given
 
     def _requested(self, style: Style, frames: int) -> Float[np.ndarray, "T K"] | None:
         """Percentiles of the controls: those of the sampling settings, elsewhere the style's."""
-        if style.controls is None:
+        if style.requests is None:
             return None
-        settings = self.run.config.sampling_settings
-        curves = parse_curves(settings.controls, self._names)
+        curves = parse_curves(self.run.config.sampling_settings.controls, self._names)
         requested = percentiles(curves, 0, frames, self.run.config.fps)
-        training = np.asarray(self.run.summary["control_mean"])
-        own = control_percentiles(style, training, settings.style_gain)
-        return np.where(np.isnan(requested), own, requested).astype(np.float32)
+        return np.where(np.isnan(requested), style.requests, requested).astype(np.float32)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
         """The last poses, as many as are in the conditioning of a frame."""
