@@ -72,3 +72,24 @@ def _hold(angles: Float[np.ndarray, "T J"], defined: Bool[np.ndarray, "T J"]) ->
     source = np.where(source < 0, np.argmax(defined, axis=0)[None], source)
     held = np.take_along_axis(angles, source, axis=0)
     return np.where(defined.any(axis=0, keepdims=True), held, 0.0)
+
+
+def continuous_yxz(
+    angles: Float[np.ndarray, "T *rows 3"], near: Float[np.ndarray, "*rows 3"]
+) -> Float[np.ndarray, "T *rows 3"]:
+    """The same rotations with angles that do not jump over time.
+
+    ``(a, b, c)`` and ``(a + pi, pi - b, c + pi)`` are the same rotation, and so are angles that differ by full turns. In
+    each frame the set nearest to that of the frame before is taken.
+
+    Args:
+        near: angles that those of the first frame are to be near, such as the mean of a corpus.
+    """
+    turn = 2.0 * np.pi
+    before, found = np.asarray(near, np.float64), np.array(angles, np.float64)
+    for frame in found:
+        other = np.stack([frame[..., 0] + np.pi, np.pi - frame[..., 1], frame[..., 2] + np.pi], axis=-1)
+        first, second = (one + turn * np.round((before - one) / turn) for one in (frame, other))
+        nearer = np.abs(first - before).sum(axis=-1) <= np.abs(second - before).sum(axis=-1)
+        frame[...] = before = np.where(nearer[..., None], first, second)
+    return found.astype(np.float32)

@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import find_body_joints
+from a2g_jax.geometry.euler import continuous_yxz
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_kinds import WIDTHS as WIDTHS
@@ -145,6 +146,16 @@ class PoseSpace:
         if self.kind == "directions":
             return pose / jnp.maximum(jnp.linalg.norm(pose, axis=-1, keepdims=True), 1e-6)
         return pose
+
+    def continuous(
+        self, pose: Float[np.ndarray, "T R D"], near: Float[np.ndarray, "R D"]
+    ) -> Float[np.ndarray, "T R D"]:
+        """The same poses in numbers that do not jump where the motion does not, as euler angles do at half a turn.
+
+        Args:
+            near: a pose that the first one is to be near in numbers, such as the mean of a corpus.
+        """
+        return continuous_yxz(pose, near) if self.kind == "euler" else pose
 
     @property
     def metres(self) -> bool:

@@ -1,6 +1,8 @@
 """Latents of a trained flow: those of clips, and generation with them (Stylized flow, ECCV 2022, Sec. 4.5)."""
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +12,11 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.controls import percentiles
-from a2g_jax.generation.engine import WINDOW
+from a2g_jax.generation.engine import LANES, WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
-from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive
+from a2g_jax.generation.stylized_flow.fit import Fitted, fit
+from a2g_jax.generation.stylized_flow.requests import matching_requests
+from a2g_jax.generation.stylized_flow.style import Style, drive, within_training
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
@@ -22,6 +26,9 @@ from a2g_jax.training.run import Run
 Rows = Float[np.ndarray, "T R D"]
 Earlier = Float[np.ndarray, "S R D"]
 LogMel = Float[np.ndarray, "F bands"]
+
+#: Seconds of a speech, and the seed of the samples, that the requests of a style are found on.
+_MATCHED, _MATCHED_SEED = 30.0, 20_220_701
 
 
 class FlowSpace:
@@ -76,17 +83,24 @@ class FlowSpace:
         """
         config = self.run.config
         motion = on_skeleton(motion, config.skeleton, config.fps, name)
-        frames, features = motion.frames, None
-        if audio is not None:
-            sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
-            # The same tolerance as in the preparation of corpora.
-            if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
-                raise InputError(
-                    f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
-                )
-            frames = min(frames, round(sound * config.fps))
-            features = log_mel(audio, config.mel, config.fps, frames)
+        frames, features = self._speech(motion, audio, name)
         return self.encode_rows(represent(motion, config.space.kind, name)[0][:frames], features)
+
+    def _speech(
+        self, motion: Motion, audio: Float[np.ndarray, " N"] | None, name: str
+    ) -> tuple[int, Float[np.ndarray, "T bands"] | None]:
+        """Frames of a clip that have speech, and log-mel rows of these; all frames and None without audio."""
+        if audio is None:
+            return motion.frames, None
+        config = self.run.config
+        sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
+        # The same tolerance as in the preparation of corpora.
+        if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
+            raise InputError(
+                f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
+            )
+        frames = min(motion.frames, round(sound * config.fps))
+        return frames, log_mel(audio, config.mel, config.fps, frames)
 
     def encode_rows(
         self, rows: Rows, features: LogMel | None = None, before: Earlier | None = None
@@ -140,15 +154,44 @@ class FlowSpace:
     ) -> Style:
         """All that the run keeps of a clip's style: its latents, and code and mean controls if the run has these.
 
-        Arguments and errors of :meth:`encode` and :class:`~a2g_jax.generation.stylized_flow.style.Style`.
+        The clip is brought into the range of the run's training motion first
+        (:func:`a2g_jax.generation.stylized_flow.fit.fit`), and so are its latents; :meth:`encode` gives those of the clip
+        as it is.
+
+        Arguments and errors of :meth:`encode`, :func:`~a2g_jax.generation.stylized_flow.fit.fit` and
+        :class:`~a2g_jax.generation.stylized_flow.style.Style`.
         """
-        latents = self.encode(motion, audio, name)
-        moved = on_skeleton(motion, self.run.config.skeleton, self.run.config.fps, name)
-        rows = represent(moved, self.run.config.space.kind, name)[0][: len(latents)]
+        return self.fitted_style(fit(motion, self.run, name), audio, mode, share, name)[0]
+
+    def fitted_style(
+        self,
+        clip: Fitted,
+        audio: Float[np.ndarray, " N"] | None = None,
+        mode: str = "repeat",
+        share: float = 1.0,
+        name: str = "the clip",
+    ) -> tuple[Style, Fitted]:
+        """The style of a fitted clip, and the clip with the figures of its latents."""
+        frames, features = self._speech(clip.motion, audio, name)
+        rows = clip.rows[:frames]
+        own = self.encode_rows(rows, features)
+        means = self.run.summary.get("latent_mean")
+        latents = within_training(own, None if means is None else np.asarray(means))
+        sizes = np.sqrt(np.square(own).mean(axis=1))
+        factor = float(np.sqrt(np.square(latents).mean() / max(float(np.square(own).mean()), 1e-12)))
         controls = None
         if self._names:
-            controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0)
-        return Style(latents, mode, share, self._style_code(rows), controls)
+            # Of the clip itself, not of its pose within range: they are requested as percentiles.
+            places = represent(clip.motion, self.run.config.space.kind, name)[0][:frames]
+            controls = self._mean_controls(places)
+        measured = replace(
+            clip,
+            distance=replace(clip.distance, code=float(np.median(sizes))),
+            adapted=replace(clip.adapted, latents=factor),
+        )
+        # The more the latents had to shrink, the less they hold of the clip's style.
+        trust = float(np.sqrt(min(factor, 1.0)))
+        return Style(latents, mode, share, self._style_code(rows), controls, trust), measured
 
     def generate(
         self,
@@ -202,21 +245,50 @@ class FlowSpace:
     ) -> Iterator[Rows]:
         """Yield the rows of :meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
         earlier = None if seed_rows is None else self._last(seed_rows)
-        given = {"seed_poses": earlier, "latents": drive(style, len(features), self.channels)}
+        if style is not None and style.requests is None:
+            style = self.match(style, features)
+        yield from self.generator.rows(features, samples, seed, **self._given(style, len(features), earlier))
+
+    def match(self, style: Style, features: LogMel) -> Style:
+        """The style with requests for one speech, so that the hands of its motion get near the clip's height, speed and
+        radius; as it is for a run without controls.
+
+        Requests are found on the first half minute of the speech, with samples that depend on nothing else.
+
+        Args:
+            features: of the speech, as in :meth:`rows`.
+        """
+        if style.controls is None or style.share == 0:
+            return style
+        heard = features[: round(_MATCHED * self.run.config.fps)]
+        plain = self.mean_controls(heard)
+        share = style.share * self.run.config.sampling_settings.style_gain
+        goal = plain + share * (style.controls - plain)
+        training = np.asarray(self.run.summary["control_mean"], np.float64)
+        draw = lambda requests: self.mean_controls(heard, replace(style, requests=requests))  # noqa: E731
+        return replace(style, requests=matching_requests(draw, goal, training))
+
+    def mean_controls(self, features: LogMel, style: Style | None = None) -> Float[np.ndarray, " K"]:
+        """Mean controls of samples for a speech, metres and m/s."""
+        drawn = self.generator.rows(features, LANES, _MATCHED_SEED, **self._given(style, len(features), None))
+        return np.mean([self._mean_controls(rows) for rows in drawn], axis=0)
+
+    def _mean_controls(self, rows: Rows) -> Float[np.ndarray, " K"]:
+        return np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0, dtype=np.float64)
+
+    def _given(self, style: Style | None, frames: int, earlier: Earlier | None) -> dict[str, Any]:
+        given: dict[str, Any] = {"seed_poses": earlier, "latents": drive(style, frames, self.channels)}
         if style is not None and style.share > 0:
-            given |= {"style": style.code, "controls": self._requested(style, len(features))}
-        yield from self.generator.rows(features, samples, seed, **given)
+            given |= {"style": style.code, "controls": self._requested(style, frames)}
+        return given
 
     def _requested(self, style: Style, frames: int) -> Float[np.ndarray, "T K"] | None:
         """Percentiles of the controls: those of the sampling settings, elsewhere the style's."""
-        if style.controls is None:
+        if style.requests is None:
             return None
-        settings = self.run.config.sampling_settings
-        curves = parse_curves(settings.controls, self._names)
+        curves = parse_curves(self.run.config.sampling_settings.controls, self._names)
         requested = percentiles(curves, 0, frames, self.run.config.fps)
-        training = np.asarray(self.run.summary["control_mean"])
-        own = control_percentiles(style, training, settings.style_gain)
-        return np.where(np.isnan(requested), own, requested).astype(np.float32)
+        return np.where(np.isnan(requested), style.requests, requested).astype(np.float32)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
         """The last poses, as many as are in the conditioning of a frame."""

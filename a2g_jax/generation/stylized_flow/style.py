@@ -25,6 +25,9 @@ from a2g_jax.errors import InputError
 from a2g_jax.models.base import Latents
 
 MODES = ("repeat", "statistics")
+#: Largest standard deviation of a channel over a clip, and root mean square of a frame over channels, of latents: those
+#: of clips of the training corpus are within.
+_WIDEST_CHANNEL, _LARGEST_FRAME = 1.3, 1.5
 #: Sine of the angle between two means below which they are interpolated linearly.
 _COLLINEAR = 1e-4
 
@@ -43,6 +46,12 @@ class Style:
     """The clip's style code, for runs with ``style_channels``; used with every share above 0."""
     controls: Float[np.ndarray, " K"] | None = None
     """The clip's mean style controls, metres and m/s, for runs with ``style_controls``."""
+    trust: float = 1.0
+    """Factor on the share for the latents alone, from 0 to 1: those of a clip far from the training data hold little
+    of its style."""
+    requests: Float[np.ndarray, " K"] | None = None
+    """Percentiles of the training clips that are requested of each control, so that the motion for one speech gets the
+    clip's: :meth:`a2g_jax.generation.stylized_flow.latent_space.FlowSpace.match`."""
 
     def __post_init__(self) -> None:
         """Refuse an unknown mode, a share out of range, and a clip without frames."""
@@ -64,6 +73,30 @@ class Style:
         return self.latents.std(axis=0)
 
 
+def within_training(
+    latents: Float[np.ndarray, "T C"], clip_means: Float[np.ndarray, "N C"] | None
+) -> Float[np.ndarray, "T C"]:
+    """Latents of a clip, no larger than those of training clips, and with the order of the clip's own.
+
+    The mean over time keeps its direction, and its norm is at most the 99th percentile of the training clips'.
+    Deviations from it keep their order: those of a channel are scaled to a standard deviation of at most 1.3, those of
+    a frame to a root mean square of at most 1.5, and the whole to a mean square of at most 1, the variance of draws.
+
+    Args:
+        clip_means: mean latents of training clips; None leaves the clip's mean as it is.
+    """
+    mean = latents.mean(axis=0)
+    if clip_means is not None:
+        longest = float(np.percentile(np.linalg.norm(clip_means, axis=1), 99))
+        mean = mean * min(1.0, longest / max(float(np.linalg.norm(mean)), 1e-9))
+    around = latents - latents.mean(axis=0)
+    around = around * np.minimum(1.0, _WIDEST_CHANNEL / np.maximum(around.std(axis=0), 1e-9))
+    sizes = np.sqrt(np.square(around).mean(axis=1, keepdims=True))
+    around = around * np.minimum(1.0, _LARGEST_FRAME / np.maximum(sizes, 1e-9))
+    around = around * min(1.0, 1.0 / max(float(np.sqrt(np.square(around).mean())), 1e-9))
+    return np.asarray(mean + around, np.float32)
+
+
 def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
     """Mean and scale of the latents of ``frames`` frames; None, for drawn latents, without a style.
 
@@ -76,34 +109,16 @@ def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
         raise InputError(
             f"the style has {style.latents.shape[1]} channels, the run {channels}; encode the clip with this run."
         )
-    rest = 1.0 - style.share**2
+    share = style.trust * style.share
+    rest = 1.0 - share**2
     if style.mode == "repeat":
-        mean = style.share * style.latents[there_and_back(frames, len(style.latents))]
+        mean = share * style.latents[there_and_back(frames, len(style.latents))]
         scale = np.full(channels, np.sqrt(rest))
     else:
-        mean = np.broadcast_to(style.share * style.mean, (frames, channels))
-        scale = np.sqrt(style.share**2 * style.std**2 + rest)
+        mean = np.broadcast_to(share * style.mean, (frames, channels))
+        scale = np.sqrt(share**2 * style.std**2 + rest)
     parts: Any = np.asarray(mean, np.float32), np.tile(np.asarray(scale, np.float32), (frames, 1))
     return Latents(*parts)
-
-
-def control_percentiles(style: Style, training: Float[np.ndarray, "N K"], gain: float = 1.0) -> Float[np.ndarray, " K"]:
-    """The style's controls as percentiles of the training clips, to be requested.
-
-    Requested values lie ``share * gain`` of the way from the median of the training clips to those of the clip, as far
-    as there are such clips: motion follows a request only in part, and a gain above 1, the inverse of that part, makes
-    up for it.
-
-    Args:
-        training: mean controls of every training clip.
-    """
-    assert style.controls is not None
-    median = np.median(training, axis=0)
-    wanted = median + style.share * gain * (style.controls - median)
-    ranks = np.linspace(0.0, 100.0, len(training))
-    return np.array(
-        [np.interp(value, np.sort(column), ranks) for value, column in zip(wanted, training.T, strict=True)], np.float32
-    )
 
 
 def there_and_back(frames: int, length: int) -> Int[np.ndarray, " frames"]:
@@ -134,7 +149,7 @@ def blend(first: Style, second: Style, share: float) -> Style:
         )
     if share in (0.0, 1.0):
         whole = (first, second)[int(share)]
-        return replace(first, latents=whole.latents, code=whole.code, controls=whole.controls)
+        return replace(whole, mode=first.mode, share=first.share, requests=None)
     length = max(len(first.latents), len(second.latents))
     ours, theirs = (style.latents[there_and_back(length, len(style.latents))] for style in (first, second))
     cos, sin = np.cos(0.5 * np.pi * share), np.sin(0.5 * np.pi * share)
@@ -144,7 +159,9 @@ def blend(first: Style, second: Style, share: float) -> Style:
     mean = _interpolate_means(ours.mean(axis=0), theirs.mean(axis=0), share)
     between = lambda a, b: None if a is None or b is None else (1.0 - share) * a + share * b  # noqa: E731
     code, controls = between(first.code, second.code), between(first.controls, second.controls)
-    return replace(first, latents=np.asarray(mean + mixed, np.float32), code=code, controls=controls)
+    trust = (1.0 - share) * first.trust + share * second.trust
+    latents = np.asarray(mean + mixed, np.float32)
+    return replace(first, latents=latents, code=code, controls=controls, trust=trust, requests=None)
 
 
 def _interpolate_means(

@@ -65,7 +65,8 @@ class Sampling(NamedTuple):
     noise: float = 0.0
     """Standard deviation of the noise that is removed, z-scores; 0 for none."""
     guidance: float = 1.0
-    """Weight of the style code: 1 as in training, more for a stronger style."""
+    """Weight of the style code, and of the controls that come with it: 1 as in training, more for a stronger style.
+    Without a style code it has no effect."""
 
 
 def start(
@@ -105,6 +106,13 @@ def proceed(
     """
     stride, overlap = networks.config.stride, networks.config.overlap
     frames = len(z) - overlap
+    if how.guidance != 1.0 and not given.unguided:
+        # Half of the states are of the condition without the style; without guidance they are not used.
+        count = len(state.history)
+        half = state._replace(states=jax.tree.map(lambda array: array[:count], state.states))
+        poses, after = proceed(networks, params, z, given, half, first, how._replace(guidance=1.0))
+        both = jax.tree.map(lambda new, old: jnp.concatenate([new, old[count:]]), after.states, state.states)
+        return poses, after._replace(states=both)
     step = _one_pose(networks, params, how)
     context = given.projected, given.unguided, given.embedding
     if stride == 1:

@@ -127,7 +127,8 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         if given.style is not None:
             style = given.style[None]
         conditions = Extras(controls, shown, style)
-        return networks.audio_context(params, given.audio, conditions, given.latents, guidance != 1.0)
+        guided = guidance != 1.0 and style is not None
+        return networks.audio_context(params, given.audio, conditions, given.latents, guided)
 
     def how(summary: Summary) -> Sampling:
         return Sampling(Limits.of(summary), noise, guidance)

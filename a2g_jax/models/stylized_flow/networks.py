@@ -59,7 +59,8 @@ class AudioContext(NamedTuple):
     projected: tuple[Array, ...]
     """Projection of the context for each step of the flow, (T, gates)."""
     unguided: tuple[Array, ...]
-    """The same without the style code, for guidance; empty without guidance."""
+    """The same without the style code and, where training hides these too, without controls, for guidance; empty without
+    guidance."""
     embedding: Float[Array, "T E"]
     """Embedding of the audio, for the global encoder; E is 0 without one."""
     latents: Latents
@@ -303,7 +304,7 @@ class FlowNetworks:
         Args:
             extras: of this one motion, B = 1, with controls of every frame.
             latents: in place of drawn ones; drawn if None.
-            guided: whether the context without the style code is computed too.
+            guided: whether the context without style code and controls is computed too.
         """
         config = self.config
         padded = jnp.pad(audio, ((config.before, config.lookahead_frames), (0, 0)))[None]
@@ -322,7 +323,10 @@ class FlowNetworks:
             whole = jnp.concatenate([context, self._extra(extras, context[None])[0]], axis=-1)
             return project(prepared, whole)
 
-        unguided = projected(extras._replace(style=None, styled=None)) if guided else ()
+        plain = extras._replace(style=None, styled=None)
+        if config.control_dropout > 0:
+            plain = plain._replace(controls=None, shown=None)
+        unguided = projected(plain) if guided else ()
         if latents is None:
             zeros = jnp.zeros((len(audio), self.channels))
             latents = Latents(zeros, zeros + 1.0)

@@ -1,0 +1,39 @@
+"""Requests of style controls that bring the motion for a speech to a clip's height, speed and radius of the hands.
+
+Motion follows a request in part, and how far depends on the speech, on the other controls and on the style code. So a
+request is corrected by what motion did with it: a few samples are drawn, measured, and what is lacking is added.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+
+#: Corrections of a request. In three the distance of the hands from the goal falls to a third on generated speakers.
+PASSES = 3
+
+Values = Float[np.ndarray, " K"]
+
+
+def matching_requests(draw: Callable[[Values], Values], goal: Values, training: Float[np.ndarray, "N K"]) -> Values:
+    """Requests, as percentiles of the training clips, with which drawn motion has about the goal's controls.
+
+    Requests stay within the range of the training clips, so that a goal beyond it is reached as far as the model can.
+
+    Args:
+        draw: mean controls of motion that is drawn with such requests; the same draws for each call.
+        goal: controls, metres and m/s.
+        training: mean controls of every training clip.
+    """
+    low, high = training.min(axis=0), training.max(axis=0)
+    asked = np.clip(goal, low, high)
+    for _ in range(PASSES):
+        asked = np.clip(asked + goal - draw(as_percentiles(asked, training)), low, high)
+    return as_percentiles(asked, training)
+
+
+def as_percentiles(values: Values, training: Float[np.ndarray, "N K"]) -> Values:
+    """Percentiles of the training clips that have these values; 0 and 100 beyond their range."""
+    ranks = np.linspace(0.0, 100.0, len(training))
+    columns = zip(values, np.sort(training, axis=0).T, strict=True)
+    return np.array([np.interp(value, column, ranks) for value, column in columns], np.float32)
