@@ -9,14 +9,14 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
-from a2g_jax.generation.controls import percentiles
+from a2g_jax.generation.controls import sampled
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
-from a2g_jax.generation.stylized_flow.style import Style, control_percentiles, drive
+from a2g_jax.generation.stylized_flow.style import Style, control_quantiles, drive
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
-from a2g_jax.models.control_curves import parse_curves
+from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
@@ -53,7 +53,8 @@ class FlowSpace:
         self._lookahead = model.lookahead
         self._params = jax.device_put(run.params)
         self._encode = jax.jit(model.encode)
-        measure = model.controls.measure if model.controls else lambda pose: jnp.zeros((*pose.shape[:2], 0))
+        measure = model.controls.measure if model.controls else None
+        measure = measure or (lambda pose: jnp.zeros((*pose.shape[:2], 0)))
         self._controls = jax.jit(measure)
         self._code = None if model.style_code is None else jax.jit(model.style_code)
         self._clip_frames = model.clip_frames
@@ -208,14 +209,16 @@ class FlowSpace:
         yield from self.generator.rows(features, samples, seed, **given)
 
     def _requested(self, style: Style, frames: int) -> Float[np.ndarray, "T K"] | None:
-        """Percentiles of the controls: those of the sampling settings, elsewhere the style's."""
+        """Quantiles of the controls: those of the sampling settings, elsewhere the style's."""
         if style.controls is None:
             return None
         settings = self.run.config.sampling_settings
         curves = parse_curves(settings.controls, self._names)
-        requested = percentiles(curves, 0, frames, self.run.config.fps)
+        requested = sampled(curves, 0, frames, self.run.config.fps)
         training = np.asarray(self.run.summary["control_mean"])
-        own = control_percentiles(style, training, settings.style_gain)
+        # The model multiplies every request by the gain of its control.
+        gains = np.array(parse_gains(settings.control_gains, self._names))
+        own = control_quantiles(style, training, settings.style_gain / gains)
         return np.where(np.isnan(requested), own, requested).astype(np.float32)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:

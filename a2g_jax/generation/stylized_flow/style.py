@@ -87,8 +87,10 @@ def drive(style: Style | None, frames: int, channels: int) -> Latents | None:
     return Latents(*parts)
 
 
-def control_percentiles(style: Style, training: Float[np.ndarray, "N K"], gain: float = 1.0) -> Float[np.ndarray, " K"]:
-    """The style's controls as percentiles of the training clips, to be requested.
+def control_quantiles(
+    style: Style, training: Float[np.ndarray, "N K"], gain: float | Float[np.ndarray, " K"] = 1.0
+) -> Float[np.ndarray, " K"]:
+    """The style's controls as quantiles of the training clips, to be requested.
 
     Requested values lie ``share * gain`` of the way from the median of the training clips to those of the clip, as far
     as there are such clips: motion follows a request only in part, and a gain above 1, the inverse of that part, makes
@@ -100,7 +102,7 @@ def control_percentiles(style: Style, training: Float[np.ndarray, "N K"], gain: 
     assert style.controls is not None
     median = np.median(training, axis=0)
     wanted = median + style.share * gain * (style.controls - median)
-    ranks = np.linspace(0.0, 100.0, len(training))
+    ranks = np.linspace(0.0, 1.0, len(training))
     return np.array(
         [np.interp(value, np.sort(column), ranks) for value, column in zip(wanted, training.T, strict=True)], np.float32
     )
