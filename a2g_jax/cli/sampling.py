@@ -16,8 +16,16 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--samples``, ``--seed`` and ``--formats``."""
+    """Add ``--control``, ``--samples``, ``--seed`` and ``--formats``."""
     known = format_names()
+    parser.add_argument(
+        "--control",
+        action="append",
+        metavar="NAME=VALUE",
+        help="energy, height, radius, rate or handedness of the hands, from 0 to 1 as quantiles of people"
+        " (energy=0.9; over seconds energy=0.2@0,0.9@10), or an emotion (emotion=anger); may be repeated; see"
+        " docs/controls.md",
+    )
     parser.add_argument("--samples", type=count, default=5, help="number of motions (default: 5)")
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument(
@@ -44,6 +52,11 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
     stored: Any = from_json(entry.sampling, split_settings(entry, values, about)[1], str(about))
     (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
     return changed
+
+
+def control_flags(options: argparse.Namespace) -> list[str]:
+    """``--control`` as flags of sampling settings."""
+    return [part for text in options.control or () for part in ("--control", text)]
 
 
 def write_samples(

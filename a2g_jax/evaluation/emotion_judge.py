@@ -1,6 +1,7 @@
 """Labels in evaluation: a classifier of emotions, and semantic relevance."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -40,13 +41,17 @@ class EmotionJudge:
     def accuracy(self, pose: Pose, emotion: str) -> float:
         """Share of the motion's clips that are classified as the emotion (EmotionGesture's EA); NaN for motion shorter
         than a clip and for emotions that the classifier lacks."""
+        return float(self.shares(pose, (emotion,))[0])
+
+    def shares(self, pose: Pose, emotions: Sequence[str]) -> Float[np.ndarray, " K"]:
+        """Share of the motion's clips that are classified as each of the emotions; see :meth:`accuracy`."""
         frames: int = self.run.config.model_config.clip_frames
         names, count = self.run.config.corpus["emotions"], len(pose) // frames
-        if count == 0 or emotion not in names:
-            return float("nan")
+        if count == 0:
+            return np.full(len(emotions), np.nan)
         clips = np.asarray(pose[: count * frames], np.float32).reshape(count, frames, *pose.shape[1:])
-        logits = np.asarray(self._logits(self.run.params, clips))
-        return float(np.mean(np.argmax(logits, axis=-1) == names.index(emotion)))
+        found = np.argmax(np.asarray(self._logits(self.run.params, clips)), axis=-1)
+        return np.array([np.mean(found == names.index(one)) if one in names else np.nan for one in emotions])
 
 
 def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> EmotionJudge:

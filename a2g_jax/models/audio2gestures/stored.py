@@ -2,8 +2,8 @@
 
 A request gives every part of a stored clip, about four seconds, a weight ``exp(-(q - r)^2 / 2 s^2)`` with q the
 quantile of its property among all parts and r the requested one; weights of several controls multiply. The clip of a
-part is drawn by the largest of ``log weight + Gumbel noise``, with one noise for a whole period: a clip stays as long as it has
-what is requested, and the code changes no more often than the request needs.
+part is drawn by the largest of ``log weight + Gumbel noise``, with one noise for a whole period: a clip stays as long
+as it has what is requested, and the code changes no more often than the request needs.
 """
 
 from typing import Any
