@@ -48,15 +48,8 @@ def _responses(axis: Axes, name: str, runs: dict[str, Any]) -> None:
         means, low, high = (np.array([one[key] for one in found["arrived"]]) for key in ("mean", "low", "high"))
         slope = found["slope"]
         label = f"{run}: slope {slope['mean']:.2f} [{slope['low']:.2f}, {slope['high']:.2f}]"
-        axis.errorbar(
-            found["requested"],
-            means,
-            yerr=[means - low, high - means],
-            marker="o",
-            capsize=3,
-            color=colour,
-            label=label,
-        )
+        errors = [means - low, high - means]
+        axis.errorbar(found["requested"], means, yerr=errors, marker="o", capsize=3, color=colour, label=label)
     axis.set_title(UNITS[name], fontsize=10)
     axis.set_xlabel(f"requested: quantiles {', '.join(f'{one:g}' for one in QUANTILES)} of people", fontsize=9)
     axis.set_ylabel("arrived", fontsize=9)

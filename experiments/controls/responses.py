@@ -55,9 +55,8 @@ def _response(
         "slope_by_draw": change.mean(axis=0).tolist(),
         "side_effects": sides,
         "agreement": [interval(by_speech(_agreement(one), subject.draws), rng) for one in made],
-        "agreement_change": [
-            interval(by_speech(_agreement(one) - _agreement(free), subject.draws), rng) for one in made
-        ],
+        "agreement_excess": [interval(by_speech(_excess(one), subject.draws), rng) for one in made],
+        "excess_change": [interval(by_speech(_excess(one) - _excess(free), subject.draws), rng) for one in made],
         "jerk_p99": [_quantile_of_jerk(one, 0.99) for one in made],
         "curve": _curve(subject, name, made, report),
     }
@@ -73,12 +72,10 @@ def _curve(
     jerks, high, low = [], [], []
     for _, rows in subject.rows([line]):
         jerks.append(subject.ruler.jerk(rows))
-        at = {second: max(0, round(second * fps) - reach) for second, _ in CURVE if 0 < second < SECONDS}
-        local = {
-            second: subject.ruler.properties(rows[first : first + 2 * reach])[index] for second, first in at.items()
-        }
-        high.append(np.mean([local[second] for second, value in CURVE if second in local and value > 0.5]))
-        low.append(np.mean([local[second] for second, value in CURVE if second in local and value < 0.5]))
+        inside = [(round(second * fps) - reach, value) for second, value in CURVE if 0 < second < SECONDS]
+        local = [(subject.ruler.properties(rows[at : at + 2 * reach])[index], value) for at, value in inside]
+        high.append(np.mean([found for found, value in local if value > 0.5]))
+        low.append(np.mean([found for found, value in local if value < 0.5]))
     report()
     seconds = np.linspace(-0.5 * AROUND, 0.5 * AROUND, 101)
     around = lambda middle: np.interp(middle + seconds, *zip(*CURVE, strict=True))  # noqa: E731
@@ -100,6 +97,7 @@ def about(figures: Sequence[Figures], draws: int) -> dict[str, Any]:
     return {
         "properties": {name: float(np.mean(column(figures, name))) for name in PROPERTIES},
         "agreement": interval(by_speech(_agreement(figures), draws), rng),
+        "agreement_excess": interval(by_speech(_excess(figures), draws), rng),
         "jerk_p99": _quantile_of_jerk(figures, 0.99),
         "jerk_p999": _quantile_of_jerk(figures, 0.999),
     }
@@ -113,6 +111,10 @@ def interval(values: Float[np.ndarray, "S draws"], rng: np.random.Generator) -> 
 
 def _agreement(figures: Sequence[Figures]) -> Float[np.ndarray, " N"]:
     return np.array([one.agreement for one in figures])
+
+
+def _excess(figures: Sequence[Figures]) -> Float[np.ndarray, " N"]:
+    return np.array([one.excess for one in figures])
 
 
 def _quantile_of_jerk(figures: Sequence[Figures], share: float) -> float:

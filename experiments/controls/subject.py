@@ -35,7 +35,9 @@ class Figures(NamedTuple):
     jerk: Float[np.ndarray, " J"]
     """Of both wrists relative to the root, m/s3, not smoothed."""
     agreement: float
-    """With the speech, less that of the motion shifted."""
+    """With the speech, as in :func:`a2g_jax.metrics.rhythm.agreement`."""
+    excess: float
+    """The same less that of the shifted motion."""
 
 
 class Ruler:
@@ -124,7 +126,7 @@ class Subject:
         motion = Motion(rotations, np.zeros((len(rows), 3), np.float32), space.skeleton, fps)
         cut = Speech(speech.name, speech.audio[: round(SECONDS * SAMPLE_RATE)], speech.speaker, None)
         found = cut.agreement(motion)
-        return Figures(self.ruler.properties(rows), self.ruler.jerk(rows), found.value - found.null_mean)
+        return Figures(self.ruler.properties(rows), self.ruler.jerk(rows), found.value, found.value - found.null_mean)
 
 
 def by_speech(values: Float[np.ndarray, " N"], draws: int) -> Float[np.ndarray, "S draws"]:

@@ -12,8 +12,9 @@ def render(figures: dict[str, Any]) -> str:
     lines = [
         "# Response to named controls",
         "",
-        f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of {about['seconds']:g} s,"
-        f" {about['draws']} motions each. Intervals are the 95 % bootstrap over speeches.",
+        f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
+        f" {about['seconds']:g} s, {about['draws']} motions each with keys of their own. Intervals are the 95 %"
+        " bootstrap over speeches.",
         "",
     ]
     for name, run in figures["runs"].items():
@@ -27,10 +28,9 @@ def _slopes(run: dict[str, Any]) -> list[str]:
     free = run["free"]
     rows = []
     for name, found in run["controls"].items():
-        changes = [
-            one["mean"] / free["agreement"]["mean"]
-            for one in (found["agreement_change"][0], found["agreement_change"][-1])
-        ]
+        ends = (0, -1)
+        kept = [found["agreement"][end]["mean"] / free["agreement"]["mean"] - 1 for end in ends]
+        excess = [_relative(found["excess_change"][end], free["agreement_excess"]["mean"]) for end in ends]
         curve = found["curve"]
         rows.append(
             [
@@ -40,30 +40,31 @@ def _slopes(run: dict[str, Any]) -> list[str]:
                 _with_interval(found["slope"]),
                 ", ".join(f"{one:.2f}" for one in found["slope_by_draw"]),
                 _with_interval(curve["slope"]),
-                ", ".join(f"{100 * one:+.0f}" for one in changes),
+                ", ".join(f"{100 * one:+.0f}" for one in kept),
+                "; ".join(excess),
                 f"{curve['jerk_p99']:.0f} ({curve['constant_jerk_p99']:.0f})",
                 f"{curve['jerk_p999']:.0f} ({curve['constant_jerk_p999']:.0f})",
             ]
         )
     heads = ["control", "requested 0.1, 0.9", "arrived", "slope", "each draw", "slope in a curve"]
-    heads += ["agreement at 0.1, 0.9, %", "jerk p99", "jerk p99.9"]
-    agreement = _with_interval(free["agreement"], 3)
+    heads += ["agreement at 0.1, 0.9, %", "its excess, %", "jerk p99", "jerk p99.9"]
+    agreement, excess = free["agreement"]["mean"], free["agreement_excess"]["mean"]
     return [
         "Slope: change of the property between requests at the 10th and the 90th percentile, over the requested change."
         " Slope in a curve: the same between peaks and valleys of a curve that rises and falls every 15 s, within 4 s."
-        " Agreement with the speech, less that of shifted motion, against motion without controls"
-        f" ({agreement}). Jerk of the wrists in that curve, m/s3, in brackets the highest of constant requests"
-        f" (without controls p99 {free['jerk_p99']:.0f}, p99.9 {free['jerk_p999']:.0f}).",
+        f" Agreement with the speech against that of motion without controls ({agreement:.3f}), and its excess over"
+        f" that of shifted motion ({excess:.3f} without controls). Jerk of the wrists in that curve, m/s3, in brackets"
+        f" the highest of constant requests (without controls p99 {free['jerk_p99']:.0f}, p99.9"
+        f" {free['jerk_p999']:.0f}).",
         "",
         *_table(heads, rows),
     ]
 
 
 def _side_effects(run: dict[str, Any]) -> list[str]:
-    rows = [
-        [name, *(f"{found['side_effects'][other]:+.2f}" for other in PROPERTIES)]
-        for name, found in run["controls"].items()
-    ]
+    rows = []
+    for name, found in run["controls"].items():
+        rows.append([name, *(f"{found['side_effects'][other]:+.2f}" for other in PROPERTIES)])
     return [
         "Change of each property from a request of 0.1 to one of 0.9, in distances between the 10th and the 90th"
         " percentile of true motion:",
@@ -95,6 +96,11 @@ def _emotions(figures: dict[str, Any]) -> list[str]:
 
 def _with_interval(found: dict[str, float], digits: int = 2) -> str:
     return f"{found['mean']:.{digits}f} [{found['low']:.{digits}f}, {found['high']:.{digits}f}]"
+
+
+def _relative(found: dict[str, float], whole: float) -> str:
+    mean, low, high = (100 * found[key] / whole for key in ("mean", "low", "high"))
+    return f"{mean:+.0f} [{low:+.0f}, {high:+.0f}]"
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
