@@ -21,6 +21,7 @@ _EXPORTS = {
     "RunConfig": "a2g_jax.training.run_config",
     "Skeleton": "a2g_jax.geometry.skeleton",
     "Style": "a2g_jax.generation.stylized_flow.style",
+    "control_rows": "a2g_jax.generation.controls",
     "demo_run": "a2g_jax.training.run",
     "evaluate": "a2g_jax.evaluation.evaluate",
     "export": "a2g_jax.generation.export",
