@@ -22,6 +22,7 @@ _EXPORTS = {
     "Skeleton": "a2g_jax.geometry.skeleton",
     "Style": "a2g_jax.generation.stylized_flow.style",
     "check_motion": "a2g_jax.metrics.body.check",
+    "control_rows": "a2g_jax.generation.controls",
     "demo_run": "a2g_jax.training.run",
     "evaluate": "a2g_jax.evaluation.evaluate",
     "export": "a2g_jax.generation.export",

@@ -4,6 +4,7 @@ from a2g_jax.errors import InputError as InputError
 from a2g_jax.evaluation.evaluate import evaluate as evaluate
 from a2g_jax.features.mel import log_mel as log_mel
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace as LatentSpace
+from a2g_jax.generation.controls import control_rows as control_rows
 from a2g_jax.generation.export import export as export
 from a2g_jax.generation.generator import Generator as Generator
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace

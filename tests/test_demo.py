@@ -1,10 +1,16 @@
 """The shipped weights: there, trained on generated data alone, and listening."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from a2g_jax.cli import main
+from a2g_jax.errors import InputError
+from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.generator import Generator
+from a2g_jax.geometry.skeleton import BODY_JOINTS
+from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.metrics.rhythm import agreement_with_null, wrist_speed
 from a2g_jax.talker.recordings import talk
@@ -43,3 +49,53 @@ def test_the_shipped_model_listens():
     assert np.mean([score.value for score in scores]) > np.mean([score.null_mean for score in scores]) + 0.03
     for motion in motions:
         assert 0.05 < wrist_speed(motion).mean() < 1.0
+
+
+def test_hands_rise_on_request_and_not_without_one(tmp_path, capsys):
+    speech, run = talk(9.0, 5).audio, demo_run()
+    generator = Generator(run)
+    body = (BODY_JOINTS.index("L_Wrist"), BODY_JOINTS.index("R_Wrist"))
+
+    def height(motion):
+        places = motion.positions()
+        return float(np.mean(places[:, body, 1] - places[:, :1, 1]))
+
+    def heights(*lines):
+        controls = control_rows(run, lines, generator.frames(speech))
+        return [height(motion) for motion in generator.generate(speech, 3, seed=0, controls=controls)]
+
+    assert np.mean(heights("height=0.9")) > np.mean(heights("height=0.1")) + 0.08
+    plain = [height(motion) for motion in generator.generate(speech, 3, seed=0)]
+    np.testing.assert_allclose(heights(), plain, atol=1e-5)
+    # The command gives what Python gives.
+    write_audio(tmp_path / "speech.wav", speech, 16000)
+    flags = ["--out", str(tmp_path / "out"), "--samples", "1", "--formats", "bvh", "--control", "height=0.1@0,0.9@6"]
+    assert main(["demo", "--audio", str(tmp_path / "speech.wav"), *flags]) == 0
+    (path,) = (tmp_path / "out").glob("*.bvh")
+    np.testing.assert_allclose(height(read_bvh(path)), heights("height=0.1@0,0.9@6")[0], atol=2e-3)
+    assert main(["demo", "--control", "height=90", "--out", str(tmp_path / "out")]) == 2
+    assert "give 0.9" in capsys.readouterr().err
+
+
+def test_weights_without_properties_refuse_controls_and_name_the_remedy():
+    run = demo_run()
+    old = replace(run, summary={"specific_code": run.summary["specific_code"]})
+    asked = replace(old, config=old.config.with_sampling(controls=("energy=0.9",)))
+    with pytest.raises(InputError, match="a2g train audio2gestures --resume"):
+        Generator(asked)
+    with pytest.raises(InputError, match="--resume"):
+        control_rows(old, ("energy=0.9",), 30)
+    Generator(old)
+
+
+@pytest.mark.parametrize(
+    ("controls", "named"),
+    [
+        (np.full((30, 6), 90.0), "energy holds values outside of 0 to 1"),
+        (np.full((30, 5), 0.5), "expected a column for each of energy"),
+        (np.full((30, 6), 0.5), "emotion holds other values than 0 to 7"),
+    ],
+)
+def test_arrays_of_controls_are_checked(controls, named):
+    with pytest.raises(InputError, match=named):
+        Generator(demo_run()).generate(np.ones(16000, np.float32), 1, controls=controls.astype(np.float32))

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
         InputError: a run, audio, clip or folder that cannot be used, or flags that do not fit the run.
     """
     existing_run(options.run)
-    settings = sampling.sampling_settings(options.run, extra)
+    settings = sampling.sampling_settings(options.run, [*extra, *sampling.control_flags(options)])
     if options.settings:
         lines = settings_lines(settings) or ["none"]
         print("# sampling settings", *lines, sep="\n")

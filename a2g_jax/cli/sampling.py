@@ -22,12 +22,20 @@ SAMPLES = 5
 def add_arguments(
     parser: argparse.ArgumentParser, samples: int | None = SAMPLES, default: str = f"default: {SAMPLES}"
 ) -> None:
-    """Add ``--samples``, ``--seed``, ``--formats`` and ``--strict``.
+    """Add ``--control``, ``--samples``, ``--seed``, ``--formats`` and ``--strict``.
 
     Args:
         samples: the default of ``--samples``, which ``default`` describes.
     """
     known = format_names()
+    parser.add_argument(
+        "--control",
+        action="append",
+        metavar="NAME=VALUE",
+        help="energy, height, radius, rate or handedness of the hands, from 0 to 1 as quantiles of people"
+        " (energy=0.9; over seconds energy=0.2@0,0.9@10), or an emotion (emotion=anger); may be repeated; see"
+        " docs/controls.md",
+    )
     parser.add_argument("--samples", type=count, default=samples, help=f"number of motions ({default})")
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument(
@@ -60,6 +68,11 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
     stored: Any = from_json(entry.sampling, split_settings(entry, values, about)[1], str(about))
     (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
     return changed
+
+
+def control_flags(options: argparse.Namespace) -> list[str]:
+    """``--control`` as flags of sampling settings."""
+    return [part for text in options.control or () for part in ("--control", text)]
 
 
 def write_samples(

@@ -1,6 +1,7 @@
 """Labels in evaluation: a classifier of emotions, and semantic relevance."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -59,10 +60,17 @@ class EmotionJudge:
     def accuracy(self, pose: Pose, emotion: str) -> float:
         """Share of the motion's clips that are classified as the emotion (EmotionGesture's EA); NaN for motion shorter
         than a clip and for emotions that the classifier lacks."""
+        return float(self.shares(pose, (emotion,))[0])
+
+    def shares(self, pose: Pose, emotions: Sequence[str]) -> Float[np.ndarray, " K"]:
+        """Share of the motion's clips that are classified as each of the emotions; see :meth:`accuracy`."""
         rows = self.probabilities(pose)
-        if len(rows) == 0 or emotion not in self.emotions:
-            return float("nan")
-        return emotion_accuracy(rows, np.full(len(rows), self.emotions.index(emotion)))
+        if len(rows) == 0:
+            return np.full(len(emotions), np.nan)
+        index = {name: number for number, name in enumerate(self.emotions)}
+        return np.array(
+            [emotion_accuracy(rows, np.full(len(rows), index[one])) if one in index else np.nan for one in emotions]
+        )
 
 
 def load_emotion_judge(folder: str | os.PathLike[str], corpus: Corpus) -> EmotionJudge:

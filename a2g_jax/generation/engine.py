@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.controls import percentiles
+from a2g_jax.generation.controls import check_rows, check_stored, sampled
 from a2g_jax.models.base import Condition
 from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.nn.blocks import BLOCK
@@ -51,8 +51,9 @@ class Engine:
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
         space, draw, begin, proceed = run.config.space, model.sample, model.begin, model.proceed
-        names = model.controls.names if model.controls else ()
-        self._curves = parse_curves(getattr(run.config.sampling_settings, "controls", ()), names)
+        self._lines = getattr(run.config.sampling_settings, "controls", ())
+        if model.controls is not None and self._lines:
+            check_stored(run, model.controls)
 
         @jax.jit
         def sample(params, summary, key, condition, start):
@@ -78,7 +79,8 @@ class Engine:
 
         Args:
             given: conditioning of the whole motion; log-mel features as corpora hold them, not normalised. Fields that
-                the model does not use have to be None; ``controls`` are those of the sampling settings if None.
+                the model does not use have to be None; ``controls`` are those of the sampling settings if None
+                (:func:`a2g_jax.generation.controls.control_rows` makes others).
 
         Raises:
             InputError: a field that the model does not use, or too few seed poses.
@@ -136,9 +138,7 @@ class Engine:
         # The quietest value is what silence looks like after the features' floor.
         padded = np.pad(given.audio, (around, (0, 0)), constant_values=float(np.min(given.audio)))
         audio: Any = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
-        controls: Any = given.controls
-        if controls is None and self._curves:
-            controls = percentiles(self._curves, 0, frames, self.run.config.fps)
+        controls = self._controls(given)
         hold = lambda array: np.pad(np.asarray(array), (around, (0, 0)), mode="edge")  # noqa: E731
         held = jax.tree.map(hold, {"emotion": given.emotion, "latents": given.latents, "controls": controls})
         words: Any = None if given.words is None else np.pad(given.words, (around,))
@@ -154,6 +154,18 @@ class Engine:
                 **jax.tree.map(lambda array, rows=rows: array[rows], held),
             )
             yield start - halo, self._condition(self._params, self._summary, cut)
+
+    def _controls(self, given: Condition) -> Any:
+        """Requested controls, frame by frame; None where there are none and the model needs none."""
+        found = self.model.controls
+        if found is None or (found.free and given.controls is None and not self._lines):
+            return None
+        check_stored(self.run, found)
+        if given.controls is not None:
+            check_rows(np.asarray(given.controls), found)
+            return given.controls
+        curves = parse_curves(self._lines, found.names, found.categories)
+        return sampled(curves, 0, len(given.audio), self.run.config.fps)
 
     def _waveform(self, given: Condition, start: int, frames: int) -> Any:
         """Samples of the frames of a window; silence before and after the audio."""

@@ -3,7 +3,7 @@
 The trainer, the generator and the evaluation use nothing else of a model. A capability that a model lacks is None.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import optax
@@ -63,7 +63,8 @@ class Condition(NamedTuple):
     seed_poses: Float[Array, "S R D"] | None = None
     """Poses before the first frame of the motion, not normalised; of the whole motion, not of a window."""
     controls: Float[Array, "T K"] | None = None
-    """Requested value of each of :attr:`Model.controls`, in percentiles of the training clips; NaN for a free one."""
+    """Requested value of each of :attr:`Model.controls`, as quantiles of the training clips from 0 to 1, or as the
+    number of a category; NaN for a free one."""
     style: Float[Array, " S"] | None = None
     """Of models with :attr:`Model.style_code`: the style code of a clip."""
     latents: Latents | None = None
@@ -133,11 +134,17 @@ class Classifier(NamedTuple):
 
 
 class Controls(NamedTuple):
-    """The capability of models whose motion is conditioned on measured properties of it."""
+    """The capability of models whose motion follows requested properties of it."""
 
     names: tuple[str, ...]
-    measure: Callable[..., Array]
-    """``measure(pose (B, T, R, D)) -> (B, T, K)``"""
+    measure: Callable[..., Array] | None = None
+    """Of models that are trained on them: ``measure(pose (B, T, R, D)) -> (B, T, K)``."""
+    categories: Mapping[str, tuple[str, ...]] = {}
+    """Names of the values of controls that are not quantiles; their values are the numbers of these names."""
+    stored: tuple[str, ...] = ()
+    """Arrays of the summary that a request needs; runs of earlier versions may lack them."""
+    free: bool = False
+    """Whether a condition without controls is that of no request; otherwise every condition has them."""
 
 
 class Model(NamedTuple):
@@ -157,6 +164,8 @@ class Model(NamedTuple):
     """``summarise(params, key, batch) -> arrays with a leading clip axis``, collected over the training split."""
     batch_fields: tuple[str, ...] = ("audio", "pose")
     """Fields of :class:`a2g_jax.data.batch.Batch` that training needs."""
+    summary_fields: tuple[str, ...] = ()
+    """The same of ``summarise``; those of training if empty."""
     needs_perceptual: bool = False
     """Whether a loss needs :attr:`Data.perceptual`."""
 

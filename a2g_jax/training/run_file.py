@@ -8,6 +8,7 @@ from typing import Any
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import read_json
+from a2g_jax.models.control_curves import from_percentiles
 from a2g_jax.models.entry import Entry
 
 FORMAT = "a2g_jax run"
@@ -73,7 +74,7 @@ def split_settings(entry: Entry, values: dict[str, Any], about: Path) -> tuple[d
         return settings, {name: value for name, value in sampling.items() if name not in _RETIRED}
     own = {field.name for field in fields(entry.sampling)} - {field.name for field in fields(entry.config)}
     moved = {name: _MOVED.get(str(name), str(name)) for name in settings}
-    return (
-        {name: value for name, value in settings.items() if moved[name] not in own},
-        {moved[name]: value for name, value in settings.items() if moved[name] in own},
-    )
+    stored = {moved[name]: value for name, value in settings.items() if moved[name] in own}
+    if "controls" in stored:
+        stored["controls"] = [from_percentiles(str(text)) for text in stored["controls"]]
+    return {name: value for name, value in settings.items() if moved[name] not in own}, stored

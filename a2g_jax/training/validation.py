@@ -20,8 +20,14 @@ _VALIDATION_CLIPS, _SUMMARY_CLIPS = 64, 4096
 _BATCH = 16
 
 
-def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: int) -> Iterator[Batch]:
-    """Batches over clips spread evenly through a split; the last one may be smaller."""
+def _batches(
+    model: Model, corpus: Corpus, config: RunConfig, split: str, most: int, fields: tuple[str, ...] = ()
+) -> Iterator[Batch]:
+    """Batches over clips spread evenly through a split; the last one may be smaller.
+
+    Args:
+        fields: of the batches; those of training if empty.
+    """
     frames = model.clip_frames
     if not corpus.splits.get(split):
         return
@@ -30,7 +36,7 @@ def _batches(model: Model, corpus: Corpus, config: RunConfig, split: str, most: 
         return
     starts = starts[np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(int)]
     make = BatchMaker(config.statistics["audio"], 0.0)
-    shape = clip_shape(model.batch_fields, frames, corpus.fps, corpus.mel.sample_rate)
+    shape = clip_shape(fields or model.batch_fields, frames, corpus.fps, corpus.mel.sample_rate)
     arrays = {name: corpus.array(name) for name in shape.arrays}
     for first in range(0, len(starts), _BATCH):
         rows = starts[first : first + _BATCH]
@@ -94,6 +100,6 @@ def collect_summary(model: Model, params: Params, corpus: Corpus, config: RunCon
     summarise = jax.jit(model.summarise)
     parts = [
         jax.device_get(summarise(params, jax.random.fold_in(jax.random.key(1), number), batch))
-        for number, batch in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS))
+        for number, batch in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS, model.summary_fields))
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -71,7 +71,7 @@ def run_of(pose="6d", controls=()):
         "root": Statistics(np.array([0.0, 0.9, 0.0], np.float32), np.ones(3, np.float32)),
     }
     config = replace(MODELS[pose], style_controls=controls)
-    sampling = StylizedFlowSampling(denoise=False, controls=("height=10",) if controls else ())
+    sampling = StylizedFlowSampling(denoise=False, controls=("height=0.1",) if controls else ())
     body = represent(clips[0].motion, pose, "it")[1]
     corpus = {"fingerprint": "toy", "recipe": {}, "seconds": 6.0}
     space = PoseSpace(body, pose)

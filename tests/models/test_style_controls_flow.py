@@ -11,12 +11,12 @@ from a2g_jax.cli import main
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
-from a2g_jax.generation.controls import percentiles
+from a2g_jax.generation.controls import sampled
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models import MODELS, find_model
 from a2g_jax.models.base import Condition, Data
-from a2g_jax.models.control_curves import parse_curves
+from a2g_jax.models.control_curves import from_percentiles, parse_curves
 from a2g_jax.models.stylized_flow.autoregression import proceed, start
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, requested, scaled
@@ -81,7 +81,7 @@ def generated(trained, *curves, frames=128):
     """Heights of the hands at every frame of a motion."""
     model = build(CONFIG, DATA, StylizedFlowSampling(controls=curves))
     params, summary = trained
-    requests = percentiles(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
+    requests = sampled(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
     given = Condition(batch_of(clips=1, frames=frames, seed=5).audio[0], controls=jnp.asarray(requests))
     condition = jax.jit(model.condition)(params, summary, given)
     pose = jax.jit(model.sample)(params, summary, jax.random.key(1), condition, jnp.int32(0))
@@ -89,11 +89,11 @@ def generated(trained, *curves, frames=128):
 
 
 def test_hands_follow_the_requested_controls(trained):
-    low, high = generated(trained, "height=10").mean(), generated(trained, "height=90").mean()
+    low, high = generated(trained, "height=0.1").mean(), generated(trained, "height=0.9").mean()
     target = np.percentile(trained[1]["control_mean"], [10, 90])
     assert high - low > 0.5 * (target[1] - target[0])
     # Over time: low at first, high at last.
-    risen = generated(trained, "height=10@2 90@4")
+    risen = generated(trained, "height=0.1@2,0.9@4")
     assert risen[-1] - risen[0] > 0.5 * (high - low)
 
 
@@ -136,9 +136,9 @@ def test_the_share_of_controls_is_that_of_training(trained):
 
 
 def test_requested_values_are_the_same_in_any_window():
-    curves = parse_curves(("speed=0@1 100@3", "height=25"), ("height", "speed"))
+    curves = parse_curves(("speed=0@1 1@3", "height=0.25"), ("height", "speed"))
     training = jnp.stack([jnp.linspace(0.0, 0.4, 5), jnp.linspace(1.0, 2.0, 5)], axis=-1)
-    values = lambda start, frames: requested(jnp.asarray(percentiles(curves, start, frames, 32.0)), training)  # noqa: E731
+    values = lambda start, frames: requested(jnp.asarray(sampled(curves, start, frames, 32.0)), training)  # noqa: E731
     whole = values(0, 256)
     parts = [values(start, 128) for start in (0, 128)]
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-6)
@@ -151,20 +151,27 @@ def test_requested_values_are_the_same_in_any_window():
     [
         ({"style_controls": ("width",)}, "--style-controls.*'width'"),
         ({"style_controls": ("height", "height")}, "each once"),
-        ({"controls": ("speed=50",)}, "controls are: height"),
-        ({"controls": ("height=101",)}, "from 0 to 100"),
-        ({"controls": ("height=-1",)}, "from 0 to 100"),
+        ({"controls": ("energy=0.5",)}, "controls are: height"),
+        ({"controls": ("height=101",)}, "from 0 to 1"),
+        ({"controls": ("height=-1",)}, "from 0 to 1"),
+        ({"controls": ("height=90",)}, "for the percentile 90 give 0.9"),
+        ({"controls": ("height=0.1@0,90@4",)}, "for the percentile 90 give 0.9"),
+        ({"controls": ("height=high",)}, "'high' is not a number"),
         ({"controls": ("height=nan",)}, "'nan' is not a number"),
-        ({"controls": ("height",)}, "NAME=PERCENTILE"),
-        ({"controls": ("height=",)}, "NAME=PERCENTILE"),
-        ({"controls": ("height=10@0 90",)}, "NAME=PERCENTILE"),
-        ({"controls": ("height=10@2 90@1",)}, "seconds in ascending order"),
-        ({"controls": ("height=10", "height=20")}, "twice"),
+        ({"controls": ("height",)}, "NAME=VALUE"),
+        ({"controls": ("height=",)}, "NAME=VALUE"),
+        ({"controls": ("height=0.1@0 0.9",)}, "NAME=VALUE"),
+        ({"controls": ("height=0.1@2 0.9@1",)}, "seconds in ascending order"),
+        ({"controls": ("height=0.1", "height=0.2")}, "twice"),
+        ({"control_gains": ("height",)}, "--control-gain 'height': expected NAME=FACTOR"),
+        ({"control_gains": ("height=0",)}, "a number above 0"),
+        ({"control_gains": ("energy=2",)}, "controls are: height"),
+        ({"control_gains": ("height=2", "height=3")}, "each once"),
     ],
 )
 def test_wrong_controls_are_named(changes, named):
     def make():
-        if "controls" in changes:
+        if {"controls", "control_gains"} & set(changes):
             return build(CONFIG, DATA, StylizedFlowSampling(**changes))
         return replace(CONFIG, **changes)
 
@@ -192,8 +199,21 @@ def test_every_preset_of_every_model_can_be_trained_and_moglow_as_published(caps
     assert "--batch-size 80" in shown
 
 
-def test_a_run_without_controls_takes_none(capsys, tmp_path):
-    (tmp_path / "x.wav").touch()
-    arguments = ["generate", "demo", "--audio", str(tmp_path / "x.wav"), "--out", str(tmp_path / "out")]
-    assert main([*arguments, "--control", "height=90"]) == 2
-    assert "no setting --control" in capsys.readouterr().err
+def test_a_gain_stretches_requests_about_the_median_of_the_training_clips():
+    training = jnp.asarray(np.random.default_rng(0).normal(size=(99, 1)), jnp.float32)
+    quantiles = jnp.asarray([[0.5], [0.6], [1.0], [jnp.nan]])
+    plain, stretched = requested(quantiles, training), requested(quantiles, training, (2.0,))
+    median = np.median(training)
+    np.testing.assert_allclose(stretched[:2] - median, 2.0 * (plain[:2] - median), atol=1e-6)
+    np.testing.assert_allclose(stretched[2:], [[np.max(training)], [median]], atol=1e-6)
+
+
+def test_speed_is_the_name_that_older_runs_have_for_energy():
+    assert parse_curves(("speed=0.2",), ("height", "speed")) == parse_curves(("energy=0.2",), ("height", "energy"))
+    assert build(replace(CONFIG, style_controls=("speed",)), DATA).controls.names == ("energy",)
+
+
+def test_percentiles_of_runs_of_version_0_1_become_quantiles():
+    assert from_percentiles("height=10@0 90@2.5") == "height=0.1@0 0.9@2.5"
+    assert from_percentiles("height=7") == "height=0.07"
+    assert from_percentiles("height") == "height"

@@ -1,6 +1,7 @@
 """The latent space of a trained Audio2Gestures: encoding, drawing, editing and decoding of codes."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,6 +10,7 @@ from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
+from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import plant_rotations, speech_features
 from a2g_jax.geometry.motion import Motion
@@ -17,6 +19,7 @@ from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.model import draw_codes
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.models.base import Condition
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 
@@ -66,13 +69,15 @@ class LatentSpace:
         self.sampling: Audio2GesturesSampling = run.config.sampling_settings
         plain = replace(self.sampling, edits=(), keep_shared=None, keep_specific=None)
         codec, model = Codec(config, run.config.data()), run.config.build()
+        condition = model.condition
+        assert condition is not None
         space = run.config.space
         self._context = -(-model.halo // BLOCK) * BLOCK
         self._params, self._summary = jax.device_put(run.params), jax.device_put(run.summary)
 
-        def draw(params, summary, audio, key):
-            shared = codec.encode_audio(params, audio[None])
-            return draw_codes(codec, plain, params, summary, key, shared, jnp.int32(-self._context))
+        def draw(params, summary, audio, key, controls):
+            shared, weights = condition(params, summary, Condition(audio, controls=controls))
+            return draw_codes(codec, plain, params, summary, key, shared, jnp.int32(-self._context), weights)
 
         def encode(params, pose):
             shared, specific = codec.encode_motion(params, pose[None])
@@ -94,7 +99,11 @@ class LatentSpace:
         padded = np.pad(features, ((self._context, self._after(frames)), (0, 0)), constant_values=features.min())
         normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)
         key = jax.random.fold_in(jax.random.key(seed), sample)
-        shared, specific = self._draw(self._params, self._summary, normalised, key)
+        controls: Any = None
+        if self.sampling.controls:
+            rows = control_rows(self._run, self.sampling.controls, frames)
+            controls = np.pad(rows, ((self._context, self._after(frames)), (0, 0)), mode="edge")
+        shared, specific = self._draw(self._params, self._summary, normalised, key, controls)
         assert specific is not None
         return Codes(shared[0], specific[0], self._context, frames)
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
-from a2g_jax.generation.controls import percentiles
+from a2g_jax.generation.controls import sampled
 from a2g_jax.generation.engine import LANES, WINDOW
 from a2g_jax.generation.generator import Generator, plant_rows, speech_features
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
@@ -60,7 +60,8 @@ class FlowSpace:
         self._lookahead = model.lookahead
         self._params = jax.device_put(run.params)
         self._encode = jax.jit(model.encode)
-        measure = model.controls.measure if model.controls else lambda pose: jnp.zeros((*pose.shape[:2], 0))
+        measure = model.controls.measure if model.controls else None
+        measure = measure or (lambda pose: jnp.zeros((*pose.shape[:2], 0)))
         self._controls = jax.jit(measure)
         self._code = None if model.style_code is None else jax.jit(model.style_code)
         self._clip_frames = model.clip_frames
@@ -260,12 +261,12 @@ class FlowSpace:
         """
         if style.controls is None or style.share == 0:
             return style
-        heard = features[: round(_MATCHED * self.run.config.fps)]
-        plain = self.mean_controls(heard)
+        stretch = features[: round(_MATCHED * self.run.config.fps)]
+        plain = self.mean_controls(stretch)
         share = style.share * self.run.config.sampling_settings.style_gain
         goal = plain + share * (style.controls - plain)
         training = np.asarray(self.run.summary["control_mean"], np.float64)
-        draw = lambda requests: self.mean_controls(heard, replace(style, requests=requests))  # noqa: E731
+        draw = lambda requests: self.mean_controls(stretch, replace(style, requests=requests))  # noqa: E731
         return replace(style, requests=matching_requests(draw, goal, training))
 
     def mean_controls(self, features: LogMel, style: Style | None = None) -> Float[np.ndarray, " K"]:
@@ -283,11 +284,11 @@ class FlowSpace:
         return given
 
     def _requested(self, style: Style, frames: int) -> Float[np.ndarray, "T K"] | None:
-        """Percentiles of the controls: those of the sampling settings, elsewhere the style's."""
+        """Quantiles of the controls: those of the sampling settings, elsewhere the style's."""
         if style.requests is None:
             return None
         curves = parse_curves(self.run.config.sampling_settings.controls, self._names)
-        requested = percentiles(curves, 0, frames, self.run.config.fps)
+        requested = sampled(curves, 0, frames, self.run.config.fps)
         return np.where(np.isnan(requested), style.requests, requested).astype(np.float32)
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:

@@ -16,7 +16,7 @@ Values = Float[np.ndarray, " K"]
 
 
 def matching_requests(draw: Callable[[Values], Values], goal: Values, training: Float[np.ndarray, "N K"]) -> Values:
-    """Requests, as percentiles of the training clips, with which drawn motion has about the goal's controls.
+    """Requests, as quantiles of the training clips, with which drawn motion has about the goal's controls.
 
     Requests stay within the range of the training clips, so that a goal beyond it is reached as far as the model can.
 
@@ -26,14 +26,14 @@ def matching_requests(draw: Callable[[Values], Values], goal: Values, training: 
         training: mean controls of every training clip.
     """
     low, high = training.min(axis=0), training.max(axis=0)
-    asked = np.clip(goal, low, high)
+    requested = np.clip(goal, low, high)
     for _ in range(PASSES):
-        asked = np.clip(asked + goal - draw(as_percentiles(asked, training)), low, high)
-    return as_percentiles(asked, training)
+        requested = np.clip(requested + goal - draw(as_quantiles(requested, training)), low, high)
+    return as_quantiles(requested, training)
 
 
-def as_percentiles(values: Values, training: Float[np.ndarray, "N K"]) -> Values:
-    """Percentiles of the training clips that have these values; 0 and 100 beyond their range."""
-    ranks = np.linspace(0.0, 100.0, len(training))
+def as_quantiles(values: Values, training: Float[np.ndarray, "N K"]) -> Values:
+    """Quantiles of the training clips that have these values; 0 and 1 beyond their range."""
+    ranks = np.linspace(0.0, 1.0, len(training))
     columns = zip(values, np.sort(training, axis=0).T, strict=True)
     return np.array([np.interp(value, column, ranks) for value, column in columns], np.float32)

@@ -50,7 +50,7 @@ class Style:
     """Factor on the share for the latents alone, from 0 to 1: those of a clip far from the training data hold little
     of its style."""
     requests: Float[np.ndarray, " K"] | None = None
-    """Percentiles of the training clips that are requested of each control, so that the motion for one speech gets the
+    """Quantiles of the training clips that are requested of each control, so that the motion for one speech gets the
     clip's: :meth:`a2g_jax.generation.stylized_flow.latent_space.FlowSpace.match`."""
 
     def __post_init__(self) -> None:

@@ -1,5 +1,7 @@
 """Audio2Gestures as a record of pure functions."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, Key
@@ -13,7 +15,17 @@ from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.networks import MAPPING_LAYERS, Gaussian
 from a2g_jax.models.audio2gestures.objective import check_objective, terms, total, weights
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
-from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.audio2gestures.stored import (
+    EMOTION,
+    LABELS,
+    VALUES,
+    clip_properties,
+    control_names,
+    log_weights,
+    stored_steps,
+)
+from a2g_jax.models.base import Condition, Controls, Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.nn.noise import blended_draws, frame_normal
 from a2g_jax.nn.tcn import receptive_halo
 
@@ -21,6 +33,16 @@ from a2g_jax.nn.tcn import receptive_halo
 RECURRENT_REACH = 256
 
 Code = Float[Array, "1 T C"]
+
+
+class Given(NamedTuple):
+    """The output of ``condition``."""
+
+    shared: Gaussian
+    """The shared code S_A of the audio."""
+    weights: Float[Array, "H N P"] | None = None
+    """Log-weights of the parts of stored clips by the requested controls; None without a request."""
+
 
 #: Draws as in the papers.
 _PAPER = Audio2GesturesSampling()
@@ -35,6 +57,9 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
     codec = Codec(config, data)
     check_objective(config)
     check_sampling(config, sampling)
+    names = control_names(config, data)
+    categories = {EMOTION: data.emotions} if EMOTION in names else {}
+    check_controls(config, sampling, names, categories)
     weighted = weights(config)
 
     def loss(
@@ -45,26 +70,30 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         return total(values, weighted(step)), values
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
-        """The specific code of every clip, or its mean and standard deviation over time for the mapping net."""
+        """The specific code of every clip with the clip's properties, or the mean and standard deviation of the code
+        over time for the mapping net."""
         specific = codec.encode_motion(params, batch.pose)[1]
         if specific is None:
             return {}
         if config.stored_codes:
-            return {"specific_code": specific.mean.astype(jnp.float16)}
+            return {"specific_code": specific.mean.astype(jnp.float16), **clip_properties(config, data, names, batch)}
         # Over its steps, as the noise has in training: interpolation would narrow it.
         code = codec.to_frames(specific.sample(key))
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
-    def condition(params: Params, summary: Summary, given: Condition) -> Gaussian:
-        """The shared code S_A of an audio."""
-        del summary
-        return codec.encode_audio(params, given.audio[None])
+    def condition(params: Params, summary: Summary, given: Condition) -> Given:
+        """The shared code S_A of an audio, and the weights of stored clips by the requested controls."""
+        shared = codec.encode_audio(params, given.audio[None])
+        if given.controls is None:
+            return Given(shared)
+        return Given(shared, log_weights(names, sampling, summary, given.controls))
 
     def sample(
-        params: Params, summary: Summary, key: Key[Array, ""], shared: Gaussian, start: Int[Array, ""]
+        params: Params, summary: Summary, key: Key[Array, ""], given: Given, start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
         """The motion g(S_A, I_R) for the output of :func:`condition`."""
-        return codec.decode(params, *draw_codes(codec, sampling, params, summary, key, shared, start))[0]
+        codes = draw_codes(codec, sampling, params, summary, key, given.shared, start, given.weights)
+        return codec.decode(params, *codes)[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
         """The motion g(S_M, I_M) of mean codes."""
@@ -91,8 +120,18 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         tuple(stages),
         summarise,
         needs_perceptual=config.lpips_weight > 0,
+        summary_fields=("audio", "pose", *(("emotion",) if EMOTION in names else ())),
         condition=condition,
+        condition_fields=("audio", *(("controls",) if names else ())),
         sample=sample,
+        controls=Controls(
+            names,
+            categories=categories,
+            stored=(VALUES, *((LABELS,) if EMOTION in names else ())),
+            free=True,
+        )
+        if names
+        else None,
         reconstruct=reconstruct,
     )
 
@@ -108,6 +147,24 @@ def check_sampling(config: Audio2GesturesConfig, sampling: Audio2GesturesSamplin
             raise InputError(f"--edit {edit!r}: takes bands from another code; this is possible from Python only.")
 
 
+def check_controls(
+    config: Audio2GesturesConfig,
+    sampling: Audio2GesturesSampling,
+    names: tuple[str, ...],
+    categories: dict[str, tuple[str, ...]],
+) -> None:
+    """Refuse controls that a run does not have.
+
+    Raises:
+        InputError: a request or a gain of such a control, or one that is not well formed.
+    """
+    if sampling.controls and not names:
+        why = "its poses have no wrists" if config.stored_codes else "it was trained without --stored-codes"
+        raise InputError(f"--control {sampling.controls[0]!r}: the run has no controls, since {why}; use 'demo'.")
+    parse_curves(sampling.controls, names, categories)
+    parse_gains(sampling.control_gains if names else (), [name for name in names if name not in categories])
+
+
 def draw_codes(
     codec: Codec,
     sampling: Audio2GesturesSampling,
@@ -116,6 +173,7 @@ def draw_codes(
     key: Key[Array, ""],
     shared: Gaussian,
     start: Int[Array, ""],
+    clip_weights: Float[Array, "H N P"] | None = None,
 ) -> tuple[Code, Code | None]:
     """The codes S_A and I_R that generation decodes: drawn, in time, edited.
 
@@ -123,16 +181,17 @@ def draw_codes(
         sampling: settings of the draw and of the edits.
         shared: output of ``condition``.
         start: first frame of the window in the whole audio, a multiple of 128.
+        clip_weights: log-weights of stored clips by the requested controls.
     """
     config = codec.config
     edits = [parse_edit(text, config.dct_points) for text in sampling.all_edits]
-    drawn = _draw(codec, sampling, params, summary, key, shared, start)
+    drawn = _draw(codec, sampling, params, summary, key, shared, start, clip_weights)
 
     def edited(place: int, name: str) -> Code:
         def other(edit: Edit) -> Code:
             # A sample number that --samples does not reach.
             again = jax.random.fold_in(key, 2**31 + int(edit.value))
-            code: Code = _draw(codec, sampling, params, summary, again, shared, start)[place]
+            code: Code = _draw(codec, sampling, params, summary, again, shared, start, clip_weights)[place]
             return code
 
         chosen = [edit for edit in edits if edit.code == name]
@@ -143,7 +202,7 @@ def draw_codes(
     return edited(0, "shared"), None if drawn[1] is None else edited(1, "specific")
 
 
-def _draw(codec, sampling, params, summary, key, shared, start):
+def _draw(codec, sampling, params, summary, key, shared, start, clip_weights):
     """Codes before any edit; I_R of training clips or of the mapping net, or standard normal without either."""
     config = codec.config
     frames, channels = shared.mean.shape[1:]
@@ -156,7 +215,8 @@ def _draw(codec, sampling, params, summary, key, shared, start):
         return audio_code, None
     size = config.specific_frames
     if config.stored_codes:
-        steps = _stored(which, summary["specific_code"], sampling, start // size, frames // size, size)
+        codes = summary["specific_code"]
+        steps = stored_steps(which, codes, sampling, start // size, frames // size, size, clip_weights)
         return audio_code, codec.specific_to_frames(steps[None])
     # One draw for each step, that of its first frame: a function of the key and the absolute frame alone.
     noise = sampling.noise_scale * frame_normal(noise_key, start, frames, channels)[::size]
@@ -171,26 +231,6 @@ def _draw(codec, sampling, params, summary, key, shared, start):
     if sampling.sample_codes:
         specific = mapped.shift(frame_normal(code_key, start, frames, channels)[None, ::size])
     return audio_code, codec.specific_to_frames(specific)
-
-
-def _stored(key, codes, sampling, first, count, size):
-    """Steps of the specific code from training clips, each taken from its beginning to its end.
-
-    Args:
-        codes: of training clips, (clips, steps, C).
-        first: number of the first step in the whole audio; may be negative, where the first step is repeated.
-        count: steps.
-        size: frames of a step.
-    """
-    clips, length, _ = codes.shape
-    number = jnp.maximum(first + jnp.arange(count), 0)
-    # Without redrawing, one clip is followed by the next one of the training split.
-    period = max(1, -(-sampling.redraw_frames // (size * length))) * length if sampling.redraw_frames else 2**20
-    draw = lambda n: jax.random.randint(jax.random.fold_in(key, n.astype(jnp.uint32)), (), 0, clips)  # noqa: E731
-    clip = jax.vmap(draw)(number // period) + (number % period) // length
-    steps = codes[clip % clips, number % length].astype(jnp.float32)
-    mean = jnp.mean(codes.astype(jnp.float32), axis=(0, 1))
-    return mean[None] + sampling.noise_scale * (steps - mean[None])
 
 
 def _halo(config: Audio2GesturesConfig) -> int:

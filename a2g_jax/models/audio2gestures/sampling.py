@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from a2g_jax.errors import InputError
+from a2g_jax.models.control_curves import parse_gain, parse_line
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,13 @@ class Audio2GesturesSampling:
     """Lowest DCT bands of the specific code that are kept, before other edits; all if not set."""
     edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
     """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5'; may be repeated."""
+    controls: tuple[str, ...] = field(default=(), metadata={"flag": "control", "repeat": True})
+    """Requested properties of the motion, as quantiles of the training clips from 0 to 1: energy, height, radius, rate
+    and handedness (0 left, 1 right), such as 'energy=0.9', or over seconds 'energy=0.2@0,0.9@10'; and an emotion of
+    the corpus, such as 'emotion=happiness'. What is not named is free. For runs with stored codes; may be repeated."""
+    control_gains: tuple[str, ...] = field(default=(), metadata={"flag": "control-gain", "repeat": True})
+    """Factor on the distance of a requested property from the median of the training clips, such as 'energy=1.5': the
+    inverse of how far motion follows a request. All that are needed, since they replace the run's; may be repeated."""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -37,6 +45,10 @@ class Audio2GesturesSampling:
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {value}.")
+        for text in self.controls:
+            parse_line(text)
+        for text in self.control_gains:
+            parse_gain(text)
 
     @property
     def all_edits(self) -> tuple[str, ...]:

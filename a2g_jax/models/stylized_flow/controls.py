@@ -1,8 +1,8 @@
 """Style controls: conditioning on the height, speed and radius of the hands.
 
 As in StyleGestures (Alexanderson et al. 2020), averages of these join the audio in the conditioning of a frame. In
-training they are those of the clip itself. In generation they are requested as percentiles of the training clips:
-:mod:`a2g_jax.models.control_curves`.
+training they are those of the clip itself. In generation they are requested as quantiles of the training clips:
+:mod:`a2g_jax.models.control_curves`; ``speed`` is requested as ``energy``, the name that it has for every model.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,7 @@ from a2g_jax.features.style_controls import hand_height, hand_radius, hand_speed
 from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.models.base import Data
 from a2g_jax.models.control_curves import DEFAULT
+from a2g_jax.models.control_requests import requested_values
 
 #: The controls, and the value that networks take as 1 (m, m/s): about the standard deviation over clips of speech.
 SCALES = {"height": 0.1, "left_height": 0.1, "right_height": 0.1, "speed": 0.1, "radius": 0.05}
@@ -79,12 +80,14 @@ def scaled(names: Sequence[str], controls: Float[Array, "*S K"]) -> Float[Array,
     return controls / scales.reshape((1,) * (controls.ndim - 1) + (len(names),))
 
 
-def requested(percentiles: Float[Array, "T K"], training: Float[Array, "N K"]) -> Float[Array, "T K"]:
-    """Control values of requested percentiles, metres and m/s; the median of those that are not a number.
+def requested(
+    quantiles: Float[Array, "T K"], training: Float[Array, "N K"], gains: Sequence[float] | None = None
+) -> Float[Array, "T K"]:
+    """Control values of requested quantiles, metres and m/s; the median of those that are not a number.
 
     Args:
         training: mean controls of every training clip.
+        gains: factors on the distance from the median; 1 if None.
     """
-    percentiles = jnp.where(jnp.isnan(percentiles), DEFAULT, percentiles)
-    columns = [jnp.percentile(training[:, number], percentiles[:, number]) for number in range(percentiles.shape[1])]
-    return jnp.stack(columns, axis=-1)
+    given = jnp.where(jnp.isnan(quantiles), DEFAULT, quantiles)
+    return requested_values(given, training, gains or (1.0,) * given.shape[1])

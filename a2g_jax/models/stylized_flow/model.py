@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.models.base import Condition, Controls, Data, Model, Params, Stage, Summary, Update
-from a2g_jax.models.control_curves import parse_curves
+from a2g_jax.models.control_curves import parse_curves, parse_gains, public_name
 from a2g_jax.models.stylized_flow import autoregression
 from a2g_jax.models.stylized_flow.autoregression import Limits, Sampling, State
 from a2g_jax.models.stylized_flow.conditioning import pose_mask
@@ -33,6 +33,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
     """
     check_controls(config.style_controls, data)
     parse_curves(sampling.controls, config.style_controls)
+    gains = parse_gains(sampling.control_gains, config.style_controls)
     networks = FlowNetworks(config, data)
     likelihood, reverse = _likelihood(networks), _reverse(networks)
 
@@ -122,7 +123,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         """The part of the conditioning that does not depend on poses."""
         controls = shown = style = None
         if given.controls is not None:
-            controls = requested(given.controls, jnp.asarray(summary["control_mean"]))[None]
+            controls = requested(given.controls, jnp.asarray(summary["control_mean"]), gains)[None]
             shown = ~jnp.isnan(given.controls)[None] if config.control_dropout > 0 else None
         if given.style is not None:
             style = given.style[None]
@@ -209,7 +210,9 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
         seed_frames=config.before,
         lookahead=networks.lookahead,
         overlap=config.overlap,
-        controls=Controls(names, networks.controls) if names else None,
+        controls=Controls(tuple(map(public_name, names)), networks.controls, stored=("control_mean",))
+        if names
+        else None,
         reconstruct=reconstruct,
         encode=encode,
         style_code=style_code if config.style_channels else None,

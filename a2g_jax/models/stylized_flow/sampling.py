@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from a2g_jax.errors import InputError
-from a2g_jax.models.control_curves import parse_curve
+from a2g_jax.models.control_curves import parse_gain, parse_line
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,12 @@ class StylizedFlowSampling:
     """How far height, speed and radius of the hands are to move from plain motion's to a style clip's, for runs with
     --style-controls, as a factor on --style-share: 1.1 for all of the way with a share of 0.9, more to exaggerate."""
     controls: tuple[str, ...] = field(default=(), metadata={"flag": "control", "repeat": True})
-    """Requested style controls in percentiles of the training clips, such as 'height=90', or over seconds
-    'height=10@0 90@5'. Those that are not named are free, or 50 in runs trained without --control-dropout. For runs
-    with --style-controls; may be repeated."""
+    """Requested energy, height and radius of the hands, as quantiles of the training clips from 0 to 1, such as
+    'height=0.9', or over seconds 'height=0.1@0,0.9@5'. What is not named is free, or 0.5 in runs trained without
+    --control-dropout. For runs with --style-controls; may be repeated."""
+    control_gains: tuple[str, ...] = field(default=(), metadata={"flag": "control-gain", "repeat": True})
+    """Factor on the distance of a requested control from the median of the training clips, such as 'energy=1.5': the
+    inverse of how far motion follows a request. All that are needed, since they replace the run's; may be repeated."""
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -35,7 +38,9 @@ class StylizedFlowSampling:
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
         for text in self.controls:
-            parse_curve(text)
+            parse_line(text)
+        for text in self.control_gains:
+            parse_gain(text)
 
 
 SAMPLING_PRESETS: dict[str, StylizedFlowSampling] = {

@@ -1,0 +1,144 @@
+"""Motion-specific codes of training clips, drawn at random or by requested properties of the clips.
+
+A request gives every part of a stored clip, about four seconds, a weight ``exp(-(q - r)^2 / 2 s^2)`` with q the
+quantile of its property among all parts and r the requested one; weights of several controls multiply. The clip of a
+part is drawn by the largest of ``log weight + Gumbel noise``, with one noise for a whole period: a clip stays as long
+as it has what is requested, and the code changes no more often than the request needs.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, Key
+
+from a2g_jax.data.batch import Batch
+from a2g_jax.features.hand_properties import PROPERTIES, hand_properties
+from a2g_jax.geometry.joint_names import named_joints
+from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.models.base import Data, Summary
+from a2g_jax.models.control_curves import parse_gains
+from a2g_jax.models.control_requests import ranks, requested_values
+
+#: Standard deviation s of a request, in quantiles.
+WIDTH = 0.05
+#: Log-weight of clips of another category than the requested one.
+OTHER = -30.0
+#: Frames for which a request holds, so that motion is not cut into pieces shorter than a stroke; a divisor of 128.
+HOLD = 64
+#: Length of the parts of a clip whose properties are stored, seconds: long enough to hold several strokes.
+PART_SECONDS = 4.0
+#: The control by the corpus's labels, and the summary's arrays of all controls.
+EMOTION, VALUES, LABELS = "emotion", "clip_properties", "clip_emotion"
+
+
+def control_names(config: Audio2GesturesConfig, data: Data) -> tuple[str, ...]:
+    """Controls of a run with stored codes: none for poses without wrists, no emotion without several of them."""
+    if not config.stored_codes or not data.space.has_rotations:
+        return ()
+    if {"L_Wrist", "R_Wrist"} - set(named_joints(data.space.body.names)):
+        return ()
+    return (*PROPERTIES, EMOTION) if len(data.emotions) > 1 else PROPERTIES
+
+
+def clip_parts(config: Audio2GesturesConfig, data: Data) -> int:
+    """Number of equal parts of a clip, of whole steps, nearest to :data:`PART_SECONDS`."""
+    steps = config.clip_frames // config.specific_frames
+    most = max(1, round(config.clip_frames / data.fps / PART_SECONDS))
+    return max(parts for parts in range(1, most + 1) if steps % parts == 0)
+
+
+def clip_properties(config: Audio2GesturesConfig, data: Data, names: tuple[str, ...], batch: Batch) -> Summary:
+    """What is stored of every clip for its controls: properties of its parts (B, P, K), and the number of its emotion
+    (B,)."""
+    if not names:
+        return {}
+    joints = named_joints(data.space.skeleton.names)
+    places = data.space.joint_positions(data.space.rotations(batch.pose))
+    wrists = jnp.array([joints["L_Wrist"], joints["R_Wrist"]])
+    clips, parts = len(places), clip_parts(config, data)
+    pieces = places.reshape(clips * parts, -1, *places.shape[2:])
+    found = jax.vmap(lambda piece: hand_properties(piece[:, wrists], piece[:, 0], data.fps))(pieces)
+    summary: Summary = {VALUES: found.reshape(clips, parts, -1).astype(jnp.float16)}
+    if batch.emotion is not None:
+        summary[LABELS] = batch.emotion.astype(jnp.int8)
+    return summary
+
+
+def log_weights(
+    names: tuple[str, ...], sampling: Audio2GesturesSampling, summary: Summary, controls: Float[Array, "T K"]
+) -> Float[Array, "H N P"]:
+    """Log-weight of every part of the stored clips for each hold of :data:`HOLD` frames.
+
+    Args:
+        controls: quantiles, and numbers of emotions; NaN for a free control.
+    """
+    asked = controls.reshape(-1, HOLD, len(names))[:, HOLD // 2]
+    count, gains = len(PROPERTIES), parse_gains(sampling.control_gains, names)[: len(PROPERTIES)]
+    stored = jnp.asarray(summary[VALUES]).astype(jnp.float32)
+    training = stored.reshape(-1, count)
+    values = requested_values(asked[:, :count], training, gains)
+    total = jnp.zeros((len(asked), len(training)))
+    for column in range(count):
+        clips, requested = (ranks(those[:, column], training[:, column]) for those in (training, values))
+        far = -0.5 * jnp.square((clips[None] - requested[:, None]) / WIDTH)
+        total += jnp.where(jnp.isnan(asked[:, column])[:, None], 0.0, far)
+    if EMOTION in names:
+        label = asked[:, count, None]
+        same = jnp.repeat(jnp.asarray(summary[LABELS]), stored.shape[1])[None] == label
+        total += jnp.where(same | jnp.isnan(label), 0.0, OTHER)
+    return total.reshape(len(asked), *stored.shape[:2])
+
+
+def stored_steps(
+    key: Key[Array, ""],
+    codes: Float[Array, "N L C"],
+    sampling: Audio2GesturesSampling,
+    first: Int[Array, ""],
+    count: int,
+    size: int,
+    weights: Float[Array, "H N P"] | None = None,
+) -> Float[Array, "count C"]:
+    """Steps of the specific code from training clips, each taken from its beginning to its end.
+
+    Args:
+        codes: of training clips.
+        first: number of the first step in the whole audio; may be negative, where the first step is repeated.
+        count: steps.
+        size: frames of a step.
+        weights: log-weights of the clips, of :func:`log_weights`; None for the same of all, as those of free controls.
+    """
+    clips, length, _ = codes.shape
+    number = jnp.maximum(first + jnp.arange(count), 0)
+    # Without redrawing, one clip is followed by the next one of the training split.
+    period = max(1, -(-sampling.redraw_frames // (size * length))) * length if sampling.redraw_frames else 2**20
+    draw = lambda n: jax.random.randint(jax.random.fold_in(key, n.astype(jnp.uint32)), (), 0, clips)  # noqa: E731
+    later = (number % period) // length
+    if weights is None:
+        clip = jax.vmap(draw)(number // period) + later
+    else:
+        hold = (number - first) * size // HOLD
+        noise = jax.vmap(lambda n: _noise(jax.random.fold_in(key, n.astype(jnp.uint32)), clips, draw(n)))
+        part = (number % length) * weights.shape[2] // length
+        clip = jax.vmap(_best)(noise(number // period), weights[hold, :, part], later) + later
+    steps = codes[clip % clips, number % length].astype(jnp.float32)
+    mean = jnp.mean(codes.astype(jnp.float32), axis=(0, 1))
+    return mean[None] + sampling.noise_scale * (steps - mean[None])
+
+
+def _noise(key: Key[Array, ""], clips: int, drawn: Int[Array, ""]) -> Float[Array, " N"]:
+    """Gumbel noise of every clip whose largest value is that of the clip drawn without a request.
+
+    The largest of independent values is equally likely everywhere, whatever the others are: exchanging it with the
+    value of a clip that is drawn uniformly changes no probability.
+    """
+    noise = jax.random.gumbel(jax.random.fold_in(key, 1), (clips,))
+    top = jnp.argmax(noise)
+    largest, other = noise[top], noise[drawn]
+    return noise.at[top].set(other).at[drawn].set(largest)
+
+
+def _best(noise: Float[Array, " N"], weights: Float[Array, " N"], later: Int[Array, ""]) -> Any:
+    """The drawn first clip of a period, of which the clip ``later`` after it is weighted."""
+    return jnp.argmax(noise + jnp.roll(weights, -later))

@@ -1,0 +1,1 @@
+"""Response of motion to named controls: energy, height, radius, rate, handedness and emotion."""
