@@ -177,6 +177,7 @@ def _pinned(pinned: "PinnedClips | Pinned", below: Chosen) -> Chosen:
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
     from a2g_jax.generation.stylized_flow.styled import Styling
+    from a2g_jax.io.files import write_json
 
     values = {"share": options.style_share, "mode": options.style_mode, "mix": options.style_mix}
     styling = Styling(
@@ -185,7 +186,13 @@ def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
         seed_clip=_clip("--seed-clip", options.seed_clip, None),
         **_given(values),
     )
-    return Chosen(styling.place(run, options.samples), {"label": styling.label}, lambda out: styling.notes)
+    styled = styling.place(run, options.samples)
+
+    def report(out: Path) -> list[str]:
+        write_json(out / "style.json", styled.to_json())
+        return [*styling.notes, *styled.lines()]
+
+    return Chosen(styled, {"label": styling.label}, report)
 
 
 def _clip(flag: str, path: str | None, audio: str | None) -> "Clip | None":

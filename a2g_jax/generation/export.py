@@ -17,7 +17,7 @@ from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
 
 #: Reports of an earlier call, which belong to other motions.
-_REPORTS = r"(pins|checks)\.json"
+_REPORTS = r"(pins|checks|style)\.json"
 
 
 def export(

@@ -79,8 +79,8 @@ def continuous_yxz(
 ) -> Float[np.ndarray, "T *rows 3"]:
     """The same rotations with angles that do not jump over time.
 
-    ``(a, b, c)`` and ``(a + pi, pi - b, c + pi)`` are the same rotation, and so are angles that differ by full turns. In
-    each frame the set nearest to that of the frame before is taken.
+    ``(a, b, c)`` and ``(a + pi, pi - b, c + pi)`` are the same rotation, and so are angles that differ by full turns.
+    In each frame the set nearest to that of the frame before is taken.
 
     Args:
         near: angles that those of the first frame are to be near, such as the mean of a corpus.

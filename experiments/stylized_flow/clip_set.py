@@ -36,12 +36,12 @@ class CandidateClip:
 
 def clips(shared: Path, fps: float) -> Iterator[CandidateClip]:
     """Every clip; real ones and the dog only where the folder of recordings has them."""
-    yield from real_clips(shared, fps)
+    yield from real_clips(shared)
     yield from generated_clips(fps)
     yield from absurd_clips(shared, fps)
 
 
-def real_clips(shared: Path, fps: float) -> Iterator[CandidateClip]:
+def real_clips(shared: Path) -> Iterator[CandidateClip]:
     """Two parts of each take: ZeroEGGS, BEAT, and BEAT2, which is the BEAT take fitted to SMPL-X."""
     sources = {
         "zeroeggs": (shared / "zeggs" / "067_Speech_2_x_1_0.bvh", shared / "zeggs" / "067_Speech_2_x_1_0.wav"),

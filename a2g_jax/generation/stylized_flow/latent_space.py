@@ -1,6 +1,6 @@
 """Latents of a trained flow: those of clips, and generation with them (Stylized flow, ECCV 2022, Sec. 4.5)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +13,13 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.controls import sampled
 from a2g_jax.generation.engine import LANES, WINDOW
-from a2g_jax.generation.generator import Generator, plant_rows, speech_features
+from a2g_jax.generation.generator import Generator, plant_rotations, speech_features
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
 from a2g_jax.generation.stylized_flow.requests import matching_requests
+from a2g_jax.generation.stylized_flow.seam import continued
 from a2g_jax.generation.stylized_flow.style import Style, drive, within_training
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.models.control_curves import parse_curves
@@ -156,8 +158,8 @@ class FlowSpace:
         """All that the run keeps of a clip's style: its latents, and code and mean controls if the run has these.
 
         The clip is brought into the range of the run's training motion first
-        (:func:`a2g_jax.generation.stylized_flow.fit.fit`), and so are its latents; :meth:`encode` gives those of the clip
-        as it is.
+        (:func:`a2g_jax.generation.stylized_flow.fit.fit`), and so are its latents; :meth:`encode` gives latents of the
+        clip as it is.
 
         Arguments and errors of :meth:`encode`, :func:`~a2g_jax.generation.stylized_flow.fit.fit` and
         :class:`~a2g_jax.generation.stylized_flow.style.Style`.
@@ -185,11 +187,7 @@ class FlowSpace:
             # Of the clip itself, not of its pose within range: they are requested as percentiles.
             places = represent(clip.motion, self.run.config.space.kind, name)[0][:frames]
             controls = self._mean_controls(places)
-        measured = replace(
-            clip,
-            distance=replace(clip.distance, code=float(np.median(sizes))),
-            adapted=replace(clip.adapted, latents=factor),
-        )
+        measured = replace(clip, code=float(np.median(sizes)), adapted=replace(clip.adapted, latents=factor))
         # The more the latents had to shrink, the less they hold of the clip's style.
         trust = float(np.sqrt(min(factor, 1.0)))
         return Style(latents, mode, share, self._style_code(rows), controls, trust), measured
@@ -200,7 +198,7 @@ class FlowSpace:
         samples: int,
         seed: int = 0,
         style: Style | None = None,
-        seed_poses: Motion | None = None,
+        seed_poses: Motion | Fitted | None = None,
     ) -> list[Motion]:
         """Motions for speech: those of :meth:`a2g_jax.generation.generator.Generator.generate` without a style and seed
         poses.
@@ -211,7 +209,8 @@ class FlowSpace:
             audio: mono, at the run's sample rate.
             style: its latents are mixed with the drawn ones.
             seed_poses: a motion that the samples continue: the poses before their first frame are its last ones, on
-                any humanoid rig and at any rate; the mean pose if None.
+                any humanoid rig and at any rate (:func:`~a2g_jax.generation.stylized_flow.fit.fit`); the mean pose if
+                None.
 
         Raises:
             InputError: audio shorter than a frame, too few seed poses, or a style of another run.
@@ -224,17 +223,16 @@ class FlowSpace:
         samples: int,
         seed: int = 0,
         style: Style | None = None,
-        seed_poses: Motion | None = None,
+        seed_poses: Motion | Fitted | None = None,
     ) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one after another."""
-        config = self.run.config
-        skeleton = config.skeleton
-        earlier = None
-        if seed_poses is not None:
-            moved = on_skeleton(seed_poses, skeleton, config.fps, "the seed clip")
-            earlier = represent(moved, config.space.kind, "the seed clip")[0]
+        clip = fit(seed_poses, self.run, "the seed clip", whole=False) if isinstance(seed_poses, Motion) else seed_poses
+        earlier = None if clip is None else clip.rows
         for rows in self.rows(speech_features(self.run, audio), samples, seed, style, earlier):
-            yield plant_rows(self.run, rows)
+            rotations = rotations_from_rows(rows, self.run.config.space.kind)
+            if clip is not None:
+                rotations = continued(rotations, clip.motion)
+            yield plant_rotations(self.run, rotations)
 
     def rows(
         self,
@@ -250,7 +248,11 @@ class FlowSpace:
             style = self.match(style, features)
         yield from self.generator.rows(features, samples, seed, **self._given(style, len(features), earlier))
 
-    def match(self, style: Style, features: LogMel) -> Style:
+    def plain(self, features: LogMel) -> list[Rows]:
+        """Samples without a style for the first half minute of a speech, which depend on nothing else."""
+        return list(self.generator.rows(self._beginning(features), LANES, _MATCHED_SEED))
+
+    def match(self, style: Style, features: LogMel, plain: Sequence[Rows] = ()) -> Style:
         """The style with requests for one speech, so that the hands of its motion get near the clip's height, speed and
         radius; as it is for a run without controls.
 
@@ -258,24 +260,27 @@ class FlowSpace:
 
         Args:
             features: of the speech, as in :meth:`rows`.
+            plain: samples of :meth:`plain`, where they are at hand.
         """
         if style.controls is None or style.share == 0:
             return style
-        stretch = features[: round(_MATCHED * self.run.config.fps)]
-        plain = self.mean_controls(stretch)
-        share = style.share * self.run.config.sampling_settings.style_gain
-        goal = plain + share * (style.controls - plain)
-        training = np.asarray(self.run.summary["control_mean"], np.float64)
-        draw = lambda requests: self.mean_controls(stretch, replace(style, requests=requests))  # noqa: E731
-        return replace(style, requests=matching_requests(draw, goal, training))
+        beginning = self._beginning(features)
+        start = self._mean_controls(*(plain or self.plain(features)))
+        goal = start + style.share * self.run.config.sampling_settings.style_gain * (style.controls - start)
 
-    def mean_controls(self, features: LogMel, style: Style | None = None) -> Float[np.ndarray, " K"]:
-        """Mean controls of samples for a speech, metres and m/s."""
-        drawn = self.generator.rows(features, LANES, _MATCHED_SEED, **self._given(style, len(features), None))
-        return np.mean([self._mean_controls(rows) for rows in drawn], axis=0)
+        def draw(requests: Float[np.ndarray, " K"]) -> Float[np.ndarray, " K"]:
+            given = self._given(replace(style, requests=requests), len(beginning), None)
+            return self._mean_controls(*self.generator.rows(beginning, LANES, _MATCHED_SEED, **given))
 
-    def _mean_controls(self, rows: Rows) -> Float[np.ndarray, " K"]:
-        return np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0].mean(axis=0, dtype=np.float64)
+        return replace(style, requests=matching_requests(draw, goal, np.asarray(self.run.summary["control_mean"])))
+
+    def _beginning(self, features: LogMel) -> LogMel:
+        return features[: round(_MATCHED * self.run.config.fps)]
+
+    def _mean_controls(self, *motions: Rows) -> Float[np.ndarray, " K"]:
+        """Mean controls of motions, metres and m/s."""
+        found = [np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0] for rows in motions]
+        return np.mean([values.mean(axis=0, dtype=np.float64) for values in found], axis=0)
 
     def _given(self, style: Style | None, frames: int, earlier: Earlier | None) -> dict[str, Any]:
         given: dict[str, Any] = {"seed_poses": earlier, "latents": drive(style, frames, self.channels)}

@@ -1,23 +1,30 @@
 """Samples in the style or with the seed poses of clips from files."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.clips import read_on_skeleton
+from a2g_jax.generation.clips import read_motion
+from a2g_jax.generation.generator import speech_features
+from a2g_jax.generation.stylized_flow.fit import Fitted, fit
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
+from a2g_jax.generation.stylized_flow.report import StyleReport, StyleTarget, hands_of, report_style
 from a2g_jax.generation.stylized_flow.style import Style, blend
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.io.audio import read_audio
+from a2g_jax.metrics.style import HandStyle
 from a2g_jax.training.run import Run
 
-#: Shortest clip that a style is taken from, seconds: shorter ones have a pose or two, and no style.
-SHORTEST = 1.0
+#: Seconds of a seed clip before its seed poses that are looked at.
+_BEFORE_SEED = 1.0
+
+#: Height, speed and radius of the hands, and the top speed of the faster one.
+Hands = tuple[HandStyle, float]
 
 
 @dataclass(frozen=True)
@@ -28,6 +35,11 @@ class Clip:
     """The option that named it, for messages."""
     path: Path
     audio: Path | None = None
+
+    @property
+    def label(self) -> str:
+        """Option and file, for messages."""
+        return f"{self.flag} {self.path}"
 
 
 @dataclass(frozen=True)
@@ -75,28 +87,39 @@ class Styling:
                 "--style-share 1: draws nothing, so that all samples would be equal; use --samples 1, a smaller share,"
                 " or --style-mode statistics."
             )
-        style = seed = None
+        style = seed = target = None
+        clips: dict[str, Fitted] = {}
         if self.style is not None:
-            style = self._style(space, self.style)
+            style, clips[self.style.label] = self._style(space, self.style)
+            hands = hands_of(clips[self.style.label].motion)
             if self.second is not None:
-                style = blend(style, self._style(space, self.second), self.mix)
+                other, clips[self.second.label] = self._style(space, self.second)
+                style = blend(style, other, self.mix)
+                hands = _between(hands, hands_of(clips[self.second.label].motion), self.mix)
+            target = hands if style.share > 0 else None
         if self.seed_clip is not None:
-            seed = read_facing(self.seed_clip, run)
-            if seed.frames < space.history:
-                raise InputError(
-                    f"{self.seed_clip.flag} {self.seed_clip.path}: has {seed.frames} frames at the run's"
-                    f" {seed.fps:g} fps; give a clip of {space.history} or more."
-                )
-        return Styled(space, style, seed)
+            seed = clips[self.seed_clip.label] = self._seed(space)
+        return Styled(space, style, seed, target, clips)
 
-    def _style(self, space: FlowSpace, clip: Clip) -> Style:
-        motion = read_facing(clip, space.run)
-        if motion.seconds < SHORTEST:
-            raise InputError(
-                f"{clip.flag} {clip.path}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST:g} s or more."
-            )
+    def _style(self, space: FlowSpace, clip: Clip) -> tuple[Style, Fitted]:
+        fitted = fit(read_motion(clip.path), space.run, clip.label)
         audio = None if clip.audio is None else read_audio(clip.audio, space.run.config.mel.sample_rate)
-        return space.style(motion, audio, self.mode, self.share, name=f"{clip.flag} {clip.path}")
+        return space.fitted_style(fitted, audio, self.mode, self.share, name=clip.label)
+
+    def _seed(self, space: FlowSpace) -> Fitted:
+        assert self.seed_clip is not None
+        motion, fps = read_motion(self.seed_clip.path), space.run.config.fps
+        frames = round(motion.seconds * fps)
+        if frames < space.history:
+            raise InputError(
+                f"{self.seed_clip.label}: has {frames} frames at the run's {fps:g} fps; give a clip of"
+                f" {space.history} or more."
+            )
+        # Only its end is continued, and faults before it do not matter.
+        needed = round((space.history / fps + _BEFORE_SEED) * motion.fps)
+        return fit(
+            motion.clip(max(0, motion.frames - needed), motion.frames), space.run, self.seed_clip.label, whole=False
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,25 +128,74 @@ class Styled:
 
     space: FlowSpace
     style: Style | None
-    seed_poses: Motion | None
+    seed_poses: Fitted | None
+    target: Hands | None = None
+    """Hands of the clip of the style; None without a style, or where wrists are not found."""
+    clips: dict[str, Fitted] = field(default_factory=dict)
+    """The clips by the option and file that named them."""
+    reports: list[StyleReport | None] = field(default_factory=list)
+    """Report on each sample of :meth:`stream` so far; None without a style."""
+    _matched: list[tuple[bytes, Style, StyleTarget | None]] = field(default_factory=list)
+    """The last speech, its style with requests, and the target of reports."""
 
     @property
     def varies(self) -> bool:
         """Whether another seed gives another motion: not if the latents of the style replace all drawn ones."""
-        return self.style is None or self.style.share < 1.0 or self.style.mode != "repeat"
+        whole = self.style is not None and self.style.share * self.style.trust == 1.0
+        return not (whole and self.style is not None and self.style.mode == "repeat")
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
-        yield from self.space.stream(audio, samples, seed, self.style, self.seed_poses)
+        self.reports.clear()
+        style, target = (None, None) if self.style is None else self._for_speech(self.style, audio)
+        for motion in self.space.stream(audio, samples, seed, style, self.seed_poses):
+            rate = self.space.run.config.mel.sample_rate
+            self.reports.append(None if target is None else report_style(motion, audio, rate, target))
+            yield motion
+
+    def _for_speech(self, style: Style, audio: Float[np.ndarray, " N"]) -> tuple[Style, StyleTarget | None]:
+        """The style with requests for a speech, found once for all samples and draws, and the target of reports."""
+        key = np.ascontiguousarray(audio).tobytes()
+        if self._matched and self._matched[0][0] == key:
+            return self._matched[0][1:]
+        features = speech_features(self.space.run, audio)
+        plain, target = self.space.plain(features), None
+        if self.target is not None:
+            config = self.space.run.config
+            without = [hands_of(config.space.motion(rows, config.fps)) for rows in plain]
+            found = [hands for hands in without if hands is not None]
+            if found:
+                hands = HandStyle(*np.mean([style for style, _ in found], axis=0).tolist())
+                target = StyleTarget(self.target[0], hands, max(self.target[1], *(top for _, top in found)))
+        self._matched[:] = [(key, self.space.match(style, features, plain), target)]
+        return self._matched[0][1:]
+
+    def to_json(self) -> dict[str, Any]:
+        """Clips and samples as JSON values."""
+        target = self._matched[0][2] if self._matched else None
+        return {
+            "format": "a2g_jax style",
+            "clips": {name: clip.as_json() for name, clip in self.clips.items()},
+            "target": None if target is None else target.to_json(),
+            "samples": [None if one is None else one.to_json() for one in self.reports],
+        }
+
+    def lines(self) -> list[str]:
+        """The same for the terminal."""
+        found = []
+        for name, clip in self.clips.items():
+            found += [f"{name}: {note}" for note in clip.notes]
+            if changes := clip.adapted.describe():
+                found.append(f"{name}: adapted to the training motion: {changes}")
+        target = self._matched[0][2] if self._matched else None
+        for number, one in enumerate(self.reports):
+            if one is not None and target is not None:
+                found.append(f"sample {number}: {one.describe(target)}")
+        return found
 
 
-def read_facing(clip: Clip, run: Run) -> Motion:
-    """A clip on the run's skeleton, at its rate, turned about the vertical to the facing direction of the run.
-
-    Raises:
-        InputError: a file that cannot be read, a rig that is not recognised, or a run without a skeleton.
-    """
-    config = run.config
-    motion = read_on_skeleton(clip.path, config.skeleton, config.fps)
-    facing = config.space.mean_rotations(config.statistics["pose"].mean)
-    return face(motion, np.asarray(facing[0], np.float64))[0]
+def _between(first: Hands | None, second: Hands | None, share: float) -> Hands | None:
+    if first is None or second is None:
+        return None
+    mixed = (1.0 - share) * np.array(first[0]) + share * np.array(second[0])
+    return HandStyle(*mixed.tolist()), max(first[1], second[1])

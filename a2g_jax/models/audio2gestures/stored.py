@@ -74,21 +74,21 @@ def log_weights(
     Args:
         controls: quantiles, and numbers of emotions; NaN for a free control.
     """
-    asked = controls.reshape(-1, HOLD, len(names))[:, HOLD // 2]
+    requested_rows = controls.reshape(-1, HOLD, len(names))[:, HOLD // 2]
     count, gains = len(PROPERTIES), parse_gains(sampling.control_gains, names)[: len(PROPERTIES)]
     stored = jnp.asarray(summary[VALUES]).astype(jnp.float32)
     training = stored.reshape(-1, count)
-    values = requested_values(asked[:, :count], training, gains)
-    total = jnp.zeros((len(asked), len(training)))
+    values = requested_values(requested_rows[:, :count], training, gains)
+    total = jnp.zeros((len(requested_rows), len(training)))
     for column in range(count):
         clips, requested = (ranks(those[:, column], training[:, column]) for those in (training, values))
         far = -0.5 * jnp.square((clips[None] - requested[:, None]) / WIDTH)
-        total += jnp.where(jnp.isnan(asked[:, column])[:, None], 0.0, far)
+        total += jnp.where(jnp.isnan(requested_rows[:, column])[:, None], 0.0, far)
     if EMOTION in names:
-        label = asked[:, count, None]
+        label = requested_rows[:, count, None]
         same = jnp.repeat(jnp.asarray(summary[LABELS]), stored.shape[1])[None] == label
         total += jnp.where(same | jnp.isnan(label), 0.0, OTHER)
-    return total.reshape(len(asked), *stored.shape[:2])
+    return total.reshape(len(requested_rows), *stored.shape[:2])
 
 
 def stored_steps(

@@ -59,8 +59,8 @@ class AudioContext(NamedTuple):
     projected: tuple[Array, ...]
     """Projection of the context for each step of the flow, (T, gates)."""
     unguided: tuple[Array, ...]
-    """The same without the style code and, where training hides these too, without controls, for guidance; empty without
-    guidance."""
+    """The same without the style code and, where training hides these too, without controls, for guidance; empty
+    without guidance."""
     embedding: Float[Array, "T E"]
     """Embedding of the audio, for the global encoder; E is 0 without one."""
     latents: Latents
