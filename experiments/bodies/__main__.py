@@ -7,8 +7,8 @@ Runs ``a2g generate`` for all shipped runs, speeches (generated, that of the dem
 options (seeds, settings, controls, pins, styles; real clips and absurd ones), and judges the files it writes by bounds
 implemented a second time (:mod:`experiments.bodies.judge`). Then the same bounds on motion that is not generated:
 held-out talk, in which findings are false alarms, and the takes of real people on the run's body. Writes
-``results/bodies.json`` and ``results/bodies.md``. Cases are kept in ``--cache`` as soon as they are measured, by weights
-and options; empty the folder after a change of the package's code.
+``results/bodies.json`` and ``results/bodies.md``. Cases are kept in ``--cache`` as soon as they are measured, by
+weights and options; empty the folder after a change of the package's code.
 """
 
 import argparse
