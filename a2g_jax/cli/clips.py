@@ -57,7 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     style.add_argument("--style-with", metavar="CLIP", help="a second clip, to blend the style with")
     style.add_argument("--style-with-audio", metavar="FILE", help="its speech (default: silence)")
     style.add_argument("--style-mix", type=share, metavar="SHARE", help="weight of the second clip (default: 0.5)")
-    style.add_argument(
+    seed = parser.add_argument_group("continuing a clip (runs of stylized_flow and emotion_gesture)")
+    seed.add_argument(
         "--seed-clip", metavar="CLIP", help="a BVH or NPZ whose last poses are the seed poses of the motions"
     )
 
@@ -76,7 +77,7 @@ def check_flags(options: argparse.Namespace) -> None:
     if options.style_with is None:
         _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
     if options.pin and (options.style is not None or options.seed_clip is not None):
-        raise InputError("--pin is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow.")
+        raise InputError("--pin is for runs of audio2gestures, --style and --seed-clip for others.")
 
 
 def check_files(options: argparse.Namespace) -> None:
@@ -106,7 +107,7 @@ class Chosen:
 
 
 def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
-    """The sampler of the flags: plain, pinned or styled.
+    """The sampler of the flags: plain, pinned, styled or continuing a clip.
 
     Args:
         audio: (N,), mono, at the run's sample rate.
@@ -116,8 +117,10 @@ def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
     """
     if options.pin:
         return _pinned(run, audio, options)
-    if options.style is not None or options.seed_clip is not None:
+    if options.style is not None:
         return _styled(run, options)
+    if options.seed_clip is not None:
+        return _seeded(run, Path(options.seed_clip))
 
     from a2g_jax.generation.generator import Generator
 
@@ -140,6 +143,12 @@ def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
         return [f"sample {number}, {describe(row)}" for number, rows in enumerate(pinned.reports) for row in rows]
 
     return Chosen(pinned, {"lanes": (pinned.lane(),)}, report)
+
+
+def _seeded(run: "Run", path: Path) -> Chosen:
+    from a2g_jax.generation.seeded import continue_clip
+
+    return Chosen(continue_clip(run, path), {"label": f"continuing {path.name}"})
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:

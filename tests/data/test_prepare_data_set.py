@@ -1,6 +1,7 @@
 """From a data set on disk to a corpus, by the command: features, poses, official splits, broken recordings."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,9 +50,11 @@ def test_the_list_is_complete(capsys):
 def test_features_of_the_papers(tmp_path, folder, paper):
     out = tmp_path / "corpus"
     command = ["prepare", "folder", str(folder), "--out", str(out), "--features", paper, "--workers", "1"]
+    features = PRESETS[paper]
+    if paper == "emotion-gesture":
+        command, features = [*command, "--waveform"], replace(features, waveform=True)
     assert main(command) == 0
     corpus = Corpus.open(out)
-    features = PRESETS[paper]
     rows = {"audio2gestures": (22, 6), "stylized-flow": (22, 3), "emotion-gesture": (47, 6)}[paper]
     frames = round(3.0 * features.fps)
     assert corpus.fps == features.fps

@@ -8,11 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.clips import read_on_skeleton
+from a2g_jax.generation.clips import read_facing
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style, blend
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.io.audio import read_audio
 from a2g_jax.training.run import Run
 
@@ -81,7 +80,7 @@ class Styling:
             if self.second is not None:
                 style = blend(style, self._style(space, self.second), self.mix)
         if self.seed_clip is not None:
-            seed = read_facing(self.seed_clip, run)
+            seed = read_facing(self.seed_clip.path, run)
             if seed.frames < space.history:
                 raise InputError(
                     f"{self.seed_clip.flag} {self.seed_clip.path}: has {seed.frames} frames at the run's"
@@ -90,7 +89,7 @@ class Styling:
         return Styled(space, style, seed)
 
     def _style(self, space: FlowSpace, clip: Clip) -> Style:
-        motion = read_facing(clip, space.run)
+        motion = read_facing(clip.path, space.run)
         if motion.seconds < SHORTEST:
             raise InputError(
                 f"{clip.flag} {clip.path}: lasts {motion.seconds:.2f} s; give a clip of {SHORTEST:g} s or more."
@@ -110,15 +109,3 @@ class Styled:
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
         yield from self.space.stream(audio, samples, seed, self.style, self.seed_poses)
-
-
-def read_facing(clip: Clip, run: Run) -> Motion:
-    """A clip on the run's skeleton, at its rate, turned about the vertical to the facing direction of the run.
-
-    Raises:
-        InputError: a file that cannot be read, a rig that is not recognised, or a run without a skeleton.
-    """
-    config = run.config
-    motion = read_on_skeleton(clip.path, config.skeleton, config.fps)
-    facing = config.space.mean_rotations(config.statistics["pose"].mean)
-    return face(motion, np.asarray(facing[0], np.float64))[0]
