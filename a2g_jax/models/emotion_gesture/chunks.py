@@ -114,10 +114,10 @@ def _chunk(
         sampled = sample_emotion(networks, params, key, sampling.temperature, jnp.nan_to_num(weights[0]))
         of_audio = jnp.isnan(weights).any(axis=-1, keepdims=True)
         features = features._replace(emotion=jnp.where(of_audio, features.emotion, sampled[None]))
-    poses = networks.decode(params, features, seed[None], labels)
-    poses = networks.flat(space.valid(networks.pose(poses)))[0]
-    before, new = poses[: config.seed_frames], poses[config.seed_frames :]
-    return new + _fade(sampling.seam_frames, config.stride) * (seed[-1:] - before[-1:])
+    made = networks.decode(params, features, seed[None], labels)[0]
+    before, new = made[: config.seed_frames], made[config.seed_frames :]
+    new = new + fade(sampling.seam_frames, config.stride) * (seed[-1:] - before[-1:])
+    return networks.flat(space.valid(networks.pose(new[None])))[0]
 
 
 def sample_emotion(
@@ -131,7 +131,7 @@ def sample_emotion(
     return jnp.einsum("ne,end->nd", weights, each)
 
 
-def _fade(frames: int, stride: int) -> Float[Array, "S 1"]:
+def fade(frames: int, stride: int) -> Float[Array, "S 1"]:
     """Weights that fall from almost 1 to 0, smoothly, over the first frames of a chunk."""
     place = jnp.minimum((jnp.arange(stride) + 1.0) / (frames + 1.0), 1.0)
     return (1.0 - place * place * (3.0 - 2.0 * place))[:, None] if frames else jnp.zeros((stride, 1))
