@@ -120,11 +120,13 @@ def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
     if options.style is not None:
         return _styled(run, options)
     if options.seed_clip is not None:
-        return _seeded(run, Path(options.seed_clip))
+        return _seeded(run, audio, Path(options.seed_clip))
 
     from a2g_jax.generation.generator import Generator
 
-    return Chosen(Generator(run))
+    generator = Generator(run)
+    generator.check(audio)
+    return Chosen(generator)
 
 
 def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
@@ -145,10 +147,12 @@ def _pinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
     return Chosen(pinned, {"lanes": (pinned.lane(),)}, report)
 
 
-def _seeded(run: "Run", path: Path) -> Chosen:
+def _seeded(run: "Run", audio: Any, path: Path) -> Chosen:
     from a2g_jax.generation.seeded import continue_clip
 
-    return Chosen(continue_clip(run, path), {"label": f"continuing {path.name}"})
+    seeded = continue_clip(run, path)
+    seeded.generator.check(audio)
+    return Chosen(seeded, {"label": f"continuing {path.name}"})
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:

@@ -15,7 +15,7 @@ from a2g_jax.models.emotion_gesture.config import PRESETS
 
 CONFIG = replace(
     PRESETS["tiny"],
-    features=8,
+    channels=8,
     heads=2,
     hidden=12,
     layers=1,

@@ -317,7 +317,7 @@ class TestSettings:
             ({"transition_frames": 5}, "--transition-frames: expected a number from 2 to 4, as --seed-frames; got 5."),
             ({"transition_frames": 1}, "--transition-frames: expected a number from 2 to 4"),
             ({"clip_frames": 5}, "--clip-frames: expected at least two frames after the 4 seed frames; got 5."),
-            ({"features": 9}, "--features: expected a multiple of the 2 --heads; got 9."),
+            ({"channels": 9}, "--channels: expected a multiple of the 2 --heads; got 9."),
             ({"audio_blocks": (1,)}, "--audio-blocks: expected as many numbers as --audio-channels has; got (1,)."),
             ({"smooth_weight": -1.0}, "--smooth-weight: expected 0 or more; got -1.0."),
             ({"beat_temperature": 0.0}, "--beat-temperature: expected a number above 0; got 0.0."),

@@ -20,7 +20,7 @@ from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import load_run
 
 SETTINGS = {
-    "features": 8,
+    "channels": 8,
     "heads": 2,
     "hidden": 8,
     "layers": 1,

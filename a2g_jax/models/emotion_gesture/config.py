@@ -20,7 +20,7 @@ class EmotionGestureConfig:
     Names of the paper's parts stand in brackets.
     """
 
-    features: int = 512
+    channels: int = 512
     """Width of all features (D)."""
     heads: int = 8
     """Heads of attention."""
@@ -131,7 +131,7 @@ class EmotionGestureConfig:
             raise _refused("vae_steps", "0 or more", self.vae_steps)
         if not 0 <= self.dropout < 1:
             raise _refused("dropout", "0 or more and below 1", self.dropout)
-        for name in ("features", "discriminator_channels"):
+        for name in ("channels", "discriminator_channels"):
             if getattr(self, name) % self.heads:
                 raise _refused(name, f"a multiple of the {self.heads} --heads", getattr(self, name))
         if self.clip_frames < self.seed_frames + 2:
@@ -161,7 +161,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
     "paper": EmotionGestureConfig(),
     "authors": EmotionGestureConfig(header="channels", prompt_space="poses"),
     "tiny": EmotionGestureConfig(
-        features=128,
+        channels=128,
         heads=4,
         hidden=256,
         layers=2,

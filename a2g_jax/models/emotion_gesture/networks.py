@@ -47,34 +47,34 @@ class Networks:
         self.classes = len(data.emotions)
         self.normalised = c.normalise_pose or not data.space.unit_scale
         modules = {
-            "audio": AudioEncoder(c.audio_blocks, c.audio_channels, c.features, c.header, data.spectra, c.dropout),
-            "fusion": Projector(c.features, c.dropout),
+            "audio": AudioEncoder(c.audio_blocks, c.audio_channels, c.channels, c.header, data.spectra, c.dropout),
+            "fusion": Projector(c.channels, c.dropout),
             "encoder": Encoder(c.layers, c.heads, c.hidden, c.dropout),
             "prompter": PosePrompter(
-                c.features, c.clip_frames, c.transition_frames, c.prompter, c.prompt_space, c.scaled_scores, c.dropout
+                c.channels, c.clip_frames, c.transition_frames, c.prompter, c.prompt_space, c.scaled_scores, c.dropout
             ),
             "decoder": PoseDecoder(c.layers, c.heads, c.hidden, self.values, c.query_positions, c.dropout),
         }
         if c.mines:
-            modules["emotion"] = Projector(c.features, c.dropout)
-            modules["beat"] = Projector(c.features, c.dropout)
+            modules["emotion"] = Projector(c.channels, c.dropout)
+            modules["beat"] = Projector(c.channels, c.dropout)
             modules["classifier"] = EmotionClassifier(c.emotion_hidden, self.classes, c.emotion_pool)
         if c.mines and c.beat_weight > 0:
-            modules["text"] = TextEncoder(c.word_buckets, c.word_width, c.word_layers, c.features, c.dropout)
+            modules["text"] = TextEncoder(c.word_buckets, c.word_width, c.word_layers, c.channels, c.dropout)
         self._generator: dict[str, Any] = modules
         self._discriminator = Discriminator(
             c.discriminator_channels, c.discriminator_layers, c.heads, c.discriminator_hidden
         )
         self._vae_encoder = FeatureEncoder(c.vae_channels, c.vae_latent)
-        self._vae_decoder = FeatureDecoder(c.vae_channels, c.clip_frames, c.features)
+        self._vae_decoder = FeatureDecoder(c.vae_channels, c.clip_frames, c.channels)
         self.samples_emotions = c.mines and c.vae_steps > 0
 
     def init(self, key: Key[Array, ""]) -> Params:
         """Initial parameters: ``generator``, and ``discriminator`` and ``vae`` where the settings have them."""
         c = self.config
         audio = jnp.zeros((1, c.clip_frames, self.data.audio_bands))
-        rows = jnp.zeros((1, c.clip_frames, c.features))
-        labelled = c.features + (self.classes if c.branches == "label" else 0)
+        rows = jnp.zeros((1, c.clip_frames, c.channels))
+        labelled = c.channels + (self.classes if c.branches == "label" else 0)
         words = jnp.zeros((1, c.clip_frames), jnp.int32)
         inputs: dict[str, tuple[Any, ...]] = {
             "audio": (audio, True),
