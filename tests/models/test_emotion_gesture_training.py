@@ -2,10 +2,12 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,7 +139,8 @@ def test_it_generates_from_the_command_line(run, speech, tmp_path, capsys, toy_c
 
 
 def test_a_seed_clip_that_is_too_short(run, speech, tmp_path, capsys):
-    write_bvh(tmp_path / "blink.bvh", talk(0.1, 4).motion)
+    motion = talk(2.0, 4).motion
+    write_bvh(tmp_path / "blink.bvh", replace(motion, rotations=motion.rotations[:3], root=motion.root[:3]))
     command = ["generate", str(run), "--audio", str(speech / "speech.wav"), "--out", str(tmp_path / "out")]
     assert main([*command, "--seed-clip", str(tmp_path / "blink.bvh")]) == 2
     assert "blink.bvh: has 3 frames at the run's 30 fps; give a clip of 4 or more." in capsys.readouterr().err
@@ -149,9 +152,8 @@ def test_models_without_seed_poses_refuse_a_seed_clip(speech, tmp_path, capsys):
     assert "--seed-clip: runs of audio2gestures take no seed poses." in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tmp_path, capsys):
-    import shutil
-
     folder = tmp_path / "corpus"
     shutil.copytree(toy_corpus.path, folder)
     for path in (folder / "annotations").iterdir():
@@ -161,6 +163,7 @@ def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tm
     assert main(train(folder, tmp_path / "run", beat_weight=0, steps=2, vae_steps=0)) == 0
 
 
+@pytest.mark.slow
 def test_pretrained_word_vectors_are_where_training_begins(toy_corpus, tmp_path, capsys):
     words = Corpus.open(toy_corpus.path).vocabulary
     assert words == tuple(sorted(set(words)))
