@@ -67,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     style.add_argument("--style-with", metavar="CLIP", help="a second clip, to blend the style with")
     style.add_argument("--style-with-audio", metavar="FILE", help="its speech (default: silence)")
     style.add_argument("--style-mix", type=share, metavar="SHARE", help="weight of the second clip (default: 0.5)")
-    style.add_argument(
+    seed = parser.add_argument_group("continuing a clip (runs of stylized_flow and emotion_gesture)")
+    seed.add_argument(
         "--seed-clip", metavar="CLIP", help="a BVH or NPZ whose last poses are the seed poses of the motions"
     )
 
@@ -88,9 +89,7 @@ def check_flags(options: argparse.Namespace) -> None:
     if options.style_with is None:
         _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
     if options.pin_mode == "latent" and (options.style is not None or options.seed_clip is not None):
-        raise InputError(
-            "--pin-mode latent is for runs of audio2gestures, --style and --seed-clip for those of stylized_flow."
-        )
+        raise InputError("--pin-mode latent is for runs of audio2gestures, --style and --seed-clip for others.")
 
 
 def check_files(options: argparse.Namespace) -> None:
@@ -120,7 +119,7 @@ class Chosen:
 
 
 def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
-    """The sampler of the flags: plain, pinned or styled.
+    """The sampler of the flags: plain, pinned, styled or continuing a clip.
 
     Args:
         audio: (N,), mono, at the run's sample rate.
@@ -131,13 +130,23 @@ def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
     if options.pin_mode == "latent":
         pinned = _in_codes(run, audio, options)
         return _pinned(pinned, Chosen(pinned))
-    if options.style is not None or options.seed_clip is not None:
-        chosen = _styled(run, options)
-    else:
-        from a2g_jax.generation.generator import Generator
-
-        chosen = Chosen(Generator(run))
+    chosen = _unpinned(run, audio, options)
     return _pinned(_performed(run, audio, options, chosen.sampler), chosen) if options.pin else chosen
+
+
+def _unpinned(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
+    # Models that encode clips also adapt those that motion continues.
+    encodes = run.config.build().encode is not None
+    if options.style is not None or (options.seed_clip is not None and encodes):
+        return _styled(run, options)
+    if options.seed_clip is not None:
+        return _seeded(run, audio, Path(options.seed_clip))
+
+    from a2g_jax.generation.generator import Generator
+
+    generator = Generator(run)
+    generator.check(audio)
+    return Chosen(generator)
 
 
 def _performed(run: "Run", audio: Any, options: argparse.Namespace, sampler: "Sampler") -> "PinnedClips":
@@ -173,6 +182,14 @@ def _pinned(pinned: "PinnedClips | Pinned", below: Chosen) -> Chosen:
         return [*below.report(out), *lines]
 
     return Chosen(pinned, {**below.about, "lanes": (pinned.lane(),)}, report)
+
+
+def _seeded(run: "Run", audio: Any, path: Path) -> Chosen:
+    from a2g_jax.generation.seeded import continue_clip
+
+    seeded = continue_clip(run, path)
+    seeded.generator.check(audio)
+    return Chosen(seeded, {"label": f"continuing {path.name}"})
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:

@@ -265,6 +265,12 @@ class Corpus:
         return bool(self._words[0].any())
 
     @cached_property
+    def vocabulary(self) -> tuple[str, ...]:
+        """The words of all recordings' transcripts without case, in alphabetical order."""
+        rows = (self.annotations(index).get("words", ()) for index in range(len(self.recordings)))
+        return tuple(sorted({str(word["text"]).strip().casefold() for words in rows for word in words}))
+
+    @cached_property
     def _first_samples(self) -> Int64[np.ndarray, " N"]:
         """Row in the waveform of the first sample of each frame."""
         step = self.mel.sample_rate / self.fps

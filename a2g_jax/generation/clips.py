@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.retarget.onto import on_skeleton
+from a2g_jax.geometry.retarget.onto import face, on_skeleton
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.training.run import Run
 
 
 def read_on_skeleton(path: Path, skeleton: Skeleton, fps: float) -> Motion:
@@ -25,3 +28,15 @@ def read_motion(path: Path) -> Motion:
         InputError: a file that cannot be read.
     """
     return read_motion_npz(path) if path.suffix.lower() == ".npz" else read_bvh(path)
+
+
+def read_facing(path: Path, run: Run) -> Motion:
+    """A clip on the run's skeleton, at its rate, turned about the vertical to the facing direction of the run.
+
+    Raises:
+        InputError: a file that cannot be read, a rig that is not recognised, or a run without a skeleton.
+    """
+    config = run.config
+    motion = read_on_skeleton(path, config.skeleton, config.fps)
+    facing = config.space.mean_rotations(config.statistics["pose"].mean)
+    return face(motion, np.asarray(facing[0], np.float64))[0]

@@ -86,6 +86,7 @@ class Engine:
             InputError: a field that the model does not use, or too few seed poses.
         """
         self._check(given)
+        given = self._with_requests(given)
         frames, key = len(given.audio), jax.random.key(seed)
         windows = self._windows(given)
         if self._begin is not None:
@@ -112,6 +113,13 @@ class Engine:
         seeds = given.seed_poses
         if seeds is not None and len(seeds) < self.model.seed_frames:
             raise InputError(f"the seed poses are {len(seeds)} frames; the run needs {self.model.seed_frames} or more.")
+
+    def _with_requests(self, given: Condition) -> Condition:
+        """The condition with what the sampling settings ask for, where it has nothing."""
+        if self.model.requested is None:
+            return given
+        asked = self.model.requested(len(given.audio))
+        return given._replace(**{name: value for name, value in asked.items() if getattr(given, name) is None})
 
     def _seeds(self, given: Condition) -> Any:
         """The last seed poses, as many as the model takes."""

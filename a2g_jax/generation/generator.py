@@ -46,6 +46,15 @@ class Generator:
         """Length of the motion for an audio: its seconds times fps, rounded."""
         return audio_frames(self.run, audio)
 
+    def check(self, audio: Audio) -> None:
+        """Refuse sampling settings that do not fit an audio, before any work.
+
+        Raises:
+            InputError: such as a timeline that goes on after its end.
+        """
+        if self.engine.model.requested is not None:
+            self.engine.model.requested(self.frames(audio))
+
     def generate(
         self,
         audio: Audio,

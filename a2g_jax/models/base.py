@@ -38,6 +38,8 @@ class Data(NamedTuple):
     """Features of poses, block by block, of a frozen feature network; for perceptual losses, in training alone."""
     sample_rate: int = 16000
     """Of waveforms, Hz."""
+    spectra: int = 1
+    """Spectra in a row of audio features, one after another in time."""
 
 
 class Latents(NamedTuple):
@@ -169,10 +171,17 @@ class Model(NamedTuple):
     needs_perceptual: bool = False
     """Whether a loss needs :attr:`Data.perceptual`."""
 
+    use_words: Callable[[Params, tuple[str, ...]], Params] | None = None
+    """``use_words(params, words) -> params``: initial parameters given the words of the training corpus, once before
+    the first step and not compiled; for pretrained word vectors."""
+
     condition: Callable[..., Any] | None = None
     """``condition(params, summary, Condition of a window) -> pytree``: shared by all samples for one audio."""
     condition_fields: tuple[str, ...] = ("audio",)
     """Fields of :class:`Condition` that ``condition`` and ``begin`` can use."""
+    requested: Callable[[int], dict[str, Any]] | None = None
+    """``requested(frames) -> fields of Condition by name``, with a row for each frame of a whole motion: what the
+    sampling settings ask for, used where the caller gives none."""
     sample: Callable[..., Array] | None = None
     """``sample(params, summary, key, condition, start) -> pose (T, R, D)``.
 

@@ -36,9 +36,13 @@ def _noam(config: TrainConfig) -> optax.Schedule:
     return schedule
 
 
-def make_optimiser(config: TrainConfig) -> optax.GradientTransformation:
-    """Adam with the schedule and clipping of the settings."""
-    adam = optax.adam(learning_rate(config))
+def make_optimiser(config: TrainConfig, momentum: float = 0.9) -> optax.GradientTransformation:
+    """Adam with the schedule and clipping of the settings.
+
+    Args:
+        momentum: decay of the first moment; 0.5 is usual in adversarial games.
+    """
+    adam = optax.adam(learning_rate(config), b1=momentum)
     clips = [optax.clip(config.clip_value)] if config.clip_value > 0 else []
     clips += [optax.clip_by_global_norm(config.clip_norm)] if config.clip_norm > 0 else []
     return optax.chain(*clips, adam) if clips else adam

@@ -19,6 +19,7 @@ MODELS: dict[str, str] = {
     "audio2gestures": "a2g_jax.models.audio2gestures",
     "speech2gesture": "a2g_jax.models.speech2gesture",
     "stylized_flow": "a2g_jax.models.stylized_flow",
+    "emotion_gesture": "a2g_jax.models.emotion_gesture",
     "motion_autoencoder": "a2g_jax.models.motion_autoencoder",
     "emotion_classifier": "a2g_jax.models.emotion_classifier",
 }

@@ -34,6 +34,14 @@ def interpolated(x: Float[Array, "B N C"], frames: int) -> Float[Array, "B _ C"]
     return jnp.einsum("jn,bknc->bkjc", weights, neighbours).reshape(clips, steps * frames, channels)
 
 
+def resized(x: Float[Array, "B N C"], frames: int) -> Float[Array, "B frames C"]:
+    """N steps over the duration of a clip as ``frames`` frames: linear between the centres, constant beyond them."""
+    steps = x.shape[1]
+    place = np.clip((np.arange(frames) + 0.5) * steps / frames - 0.5, 0.0, steps - 1.0)
+    weights = np.maximum(1.0 - np.abs(place[:, None] - np.arange(steps)[None]), 0.0)
+    return jnp.einsum("tn,bnc->btc", jnp.asarray(weights, x.dtype), x)
+
+
 def _weights(frames: int) -> Float[np.ndarray, "frames 3"]:
     """Weights of the previous, the own and the next step for each frame of a step."""
     place = (np.arange(frames) + 0.5) / frames - 0.5

@@ -79,6 +79,8 @@ def train(
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
         config = keep_sampling(config, out)
+    elif model.use_words is not None:
+        state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
     config = replace(config, body_extremes=corpus_extremes(corpus))
     export = partial(_export, config, model, corpus, out)

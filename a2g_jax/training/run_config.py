@@ -151,6 +151,7 @@ class RunConfig:
             tuple(self.corpus.get("speakers", ())),
             None if self.perceptual is None else self.perceptual.features,
             self.mel.sample_rate,
+            self.mel.stack,
         )
 
     def build(self) -> Model:

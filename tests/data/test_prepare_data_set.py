@@ -49,9 +49,9 @@ def test_the_list_is_complete(capsys):
 def test_features_of_the_papers(tmp_path, folder, paper):
     out = tmp_path / "corpus"
     command = ["prepare", "folder", str(folder), "--out", str(out), "--features", paper, "--workers", "1"]
+    features = PRESETS[paper]
     assert main(command) == 0
     corpus = Corpus.open(out)
-    features = PRESETS[paper]
     rows = {"audio2gestures": (22, 6), "stylized-flow": (22, 3), "emotion-gesture": (47, 6)}[paper]
     frames = round(3.0 * features.fps)
     assert corpus.fps == features.fps

@@ -1,0 +1,49 @@
+"""Samples that continue the last poses of a clip from a file, for any model that takes seed poses."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from a2g_jax.errors import InputError
+from a2g_jax.generation.clips import read_facing
+from a2g_jax.generation.generator import Generator
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_track import represent
+from a2g_jax.training.run import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Seeded:
+    """A sampler with seed poses."""
+
+    generator: Generator
+    seed_poses: Float[np.ndarray, "S R D"]
+
+    def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
+        """Yield samples one after another."""
+        yield from self.generator.stream(audio, samples, seed, seed_poses=self.seed_poses)
+
+
+def continue_clip(run: Run, path: Path) -> Seeded:
+    """A sampler whose motions continue a clip.
+
+    Args:
+        path: any humanoid BVH, or an NPZ that this package wrote.
+
+    Raises:
+        InputError: a file or rig that cannot be used, a clip that is too short, or a run without seed poses.
+    """
+    generator = Generator(run)
+    needed, config = generator.engine.model.seed_frames, run.config
+    if needed == 0:
+        raise InputError(f"--seed-clip: runs of {config.model} take no seed poses.")
+    motion = read_facing(path, run)
+    if motion.frames < needed:
+        raise InputError(
+            f"--seed-clip {path}: has {motion.frames} frames at the run's {motion.fps:g} fps; give a clip of"
+            f" {needed} or more."
+        )
+    return Seeded(generator, represent(motion, config.space.kind, str(path))[0][-needed:])

@@ -1,0 +1,201 @@
+"""Settings of EmotionGesture and its presets."""
+
+from dataclasses import dataclass, fields
+
+from a2g_jax.errors import InputError
+from a2g_jax.models.train_config import TrainConfig
+
+HEADERS = ("aligned", "channels")
+BRANCHES = ("emotion-beat", "none", "label")
+POOLS = ("flat", "mean")
+PROMPTERS = ("spatial-temporal", "spatial", "predictor", "duplicate", "zero")
+PROMPT_SPACES = ("features", "poses")
+BEAT_FORMS = ("printed", "words")
+
+
+@dataclass(frozen=True)
+class EmotionGestureConfig:
+    """Networks and losses; the defaults are the paper's (Sec. III and IV-A), and where it is silent its authors' code.
+
+    Names of the paper's parts stand in brackets.
+    """
+
+    channels: int = 512
+    """Width of all features (D)."""
+    heads: int = 8
+    """Heads of attention."""
+    hidden: int = 2048
+    """Width of the hidden layer after each attention."""
+    layers: int = 3
+    """Layers of the audio encoder's Transformer, and of the decoder."""
+    dropout: float = 0.2
+    audio_blocks: tuple[int, ...] = (3, 4, 6)
+    """Residual blocks of each stage of the audio encoder."""
+    audio_channels: tuple[int, ...] = (32, 64, 128)
+    """Channels of each stage."""
+    header: str = "aligned"
+    """How the audio encoder gets to one row a frame: 'aligned' keeps the spectrogram's time and interpolates it to the
+    frames; 'channels' makes a frame of each channel of a convolution, as the authors' code."""
+    branches: str = "emotion-beat"
+    """'emotion-beat': emotion and beat features (EBM); for ablations 'none': features of the audio as they are, and
+    'label': the same with the emotion's label beside them."""
+    emotion_pool: str = "flat"
+    """What the emotion classifier takes: the features of all frames ('flat') or their mean ('mean')."""
+    emotion_hidden: tuple[int, ...] = (512, 256, 64)
+    """Hidden layers of the emotion classifier."""
+    word_width: int = 300
+    """Length of word vectors."""
+    word_layers: int = 3
+    """Blocks of the text encoder; block i reaches ``2 ** (i + 1)`` frames back."""
+    word_buckets: int = 16384
+    """Rows of the table of word vectors; a word has the row of its hash, and shares it with others."""
+    word_vectors: str = ""
+    """A text file of pretrained word vectors (word2vec's or fastText's form) that the table begins with; random vectors
+    if empty."""
+    clip_frames: int = 60
+    """Frames of a clip, and of a chunk in generation (N)."""
+    seed_frames: int = 10
+    """Initial poses of a clip (M)."""
+    transition_frames: int = 10
+    """Poses on either side of the transition from initial to future poses (L)."""
+    prompter: str = "spatial-temporal"
+    """How initial poses become a prompt for all frames (STP); for ablations 'spatial' without the temporal
+    reinforcement, 'predictor' without the interpolation too, and the initial poses themselves, repeated ('duplicate')
+    or followed by zeros ('zero')."""
+    prompt_space: str = "features"
+    """Whether the prompter works on pose features, as the paper has it, or on poses, as the authors' code."""
+    scaled_scores: bool = False
+    """Whether the prompter's products are divided by the root of their length (Eq. 3) or by it (Eq. 4): as printed,
+    sigmoid and softmax begin saturated."""
+    query_positions: bool = False
+    """Whether the decoder's queries have a position encoding; without one, zeros are the same query at every frame."""
+    normalise_pose: bool = False
+    """Whether networks and losses have poses as z-scores; poses of other kinds than 6D always are."""
+    discriminator_channels: int = 128
+    """Width of the discriminator's Transformer."""
+    discriminator_layers: int = 2
+    discriminator_hidden: tuple[int, ...] = (2048, 1024, 256, 64, 16)
+    """Hidden layers after it."""
+
+    reconstruction_weight: float = 100.0
+    """Weight of the L1 distance of poses (Eq. 7)."""
+    adversarial_weight: float = 1.0
+    """Weight of the adversarial loss (Eq. 8); 0 trains without a discriminator."""
+    beat_weight: float = 0.05
+    """Weight of the beat alignment (Eq. 2), which needs words; 0 trains without them."""
+    emotion_weight: float = 0.1
+    """Weight of the emotion classification."""
+    smooth_weight: float = 0.5
+    """Weight of the motion-smooth loss (Eq. 6)."""
+    beat_temperature: float = 0.1
+    """Temperature of the beat alignment."""
+    beat_form: str = "printed"
+    """'printed': one logarithm of the sum over a clip's words (Eq. 2), which the best aligned word dominates; 'words':
+    the mean over words of InfoNCE."""
+    smooth_temperature: float = 10.0
+    """Divisor of the true motion's offsets in the motion-smooth loss."""
+
+    vae_latent: int = 32
+    """Length of the emotion-conditioned VAE's latent."""
+    vae_channels: int = 40
+    vae_steps: int = 30_000
+    """Training steps of the emotion-conditioned VAE, after all others; 0 leaves it out."""
+    vae_kl_weight: float = 0.01
+    """Weight of its KL divergence against the relative squared error."""
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("header", HEADERS),
+            ("branches", BRANCHES),
+            ("emotion_pool", POOLS),
+            ("prompter", PROMPTERS),
+            ("prompt_space", PROMPT_SPACES),
+            ("beat_form", BEAT_FORMS),
+        ):
+            if getattr(self, name) not in known:
+                raise _refused(name, f"one of {', '.join(known)}", getattr(self, name))
+        for name in ("audio_blocks", "audio_channels", "emotion_hidden", "discriminator_hidden"):
+            if not getattr(self, name) or min(getattr(self, name)) < 1:
+                raise _refused(name, "numbers above 0 such as 64,128", getattr(self, name))
+        if len(self.audio_blocks) != len(self.audio_channels):
+            raise _refused("audio_blocks", "as many numbers as --audio-channels has", self.audio_blocks)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name.endswith("_weight") and not 0 <= value < float("inf"):
+                raise _refused(field.name, "0 or more", value)
+            if field.name.endswith("_temperature") and not 0 < value < float("inf"):
+                raise _refused(field.name, "a number above 0", value)
+            if field.type in (int, "int") and field.name != "vae_steps" and value < 1:
+                raise _refused(field.name, "1 or more", value)
+        if self.vae_steps < 0:
+            raise _refused("vae_steps", "0 or more", self.vae_steps)
+        if not 0 <= self.dropout < 1:
+            raise _refused("dropout", "0 or more and below 1", self.dropout)
+        for name in ("channels", "discriminator_channels"):
+            if getattr(self, name) % self.heads:
+                raise _refused(name, f"a multiple of the {self.heads} --heads", getattr(self, name))
+        if self.clip_frames < self.seed_frames + 2:
+            raise _refused(
+                "clip_frames", f"at least two frames after the {self.seed_frames} seed frames", self.clip_frames
+            )
+        most = min(self.seed_frames, self.clip_frames - self.seed_frames)
+        if not 2 <= self.transition_frames <= most:
+            raise _refused("transition_frames", f"a number from 2 to {most}, as --seed-frames", self.transition_frames)
+
+    @property
+    def stride(self) -> int:
+        """Frames of a chunk after its initial poses."""
+        return self.clip_frames - self.seed_frames
+
+    @property
+    def mines(self) -> bool:
+        """Whether there are emotion and beat features."""
+        return self.branches == "emotion-beat"
+
+
+def _refused(name: str, expected: str, value: object) -> InputError:
+    return InputError(f"--{name.replace('_', '-')}: expected {expected}; got {value}.")
+
+
+PRESETS: dict[str, EmotionGestureConfig] = {
+    "paper": EmotionGestureConfig(),
+    "authors": EmotionGestureConfig(header="channels", prompt_space="poses"),
+    "tiny": EmotionGestureConfig(
+        channels=128,
+        heads=4,
+        hidden=256,
+        layers=2,
+        dropout=0.1,
+        audio_blocks=(1, 1, 1),
+        audio_channels=(8, 16, 32),
+        emotion_pool="mean",
+        emotion_hidden=(64,),
+        word_width=64,
+        word_buckets=2048,
+        scaled_scores=True,
+        query_positions=True,
+        normalise_pose=True,
+        discriminator_channels=64,
+        discriminator_layers=1,
+        discriminator_hidden=(64,),
+        beat_form="words",
+        vae_steps=600,
+    ),
+}
+
+TRAINING_PRESETS: dict[str, TrainConfig] = {
+    # 100 epochs of the 38,814 training clips of BEAT.
+    "paper": TrainConfig(steps=30_300, batch_size=128, learning_rate=2e-4),
+    "authors": TrainConfig(steps=30_300, batch_size=128, learning_rate=2e-4),
+    "tiny": TrainConfig(
+        steps=2_000,
+        batch_size=16,
+        learning_rate=5e-4,
+        schedule="cosine",
+        warmup_steps=100,
+        clip_norm=1.0,
+        augmentation=1.0,
+        checkpoint_every=500,
+        validate_every=500,
+    ),
+}

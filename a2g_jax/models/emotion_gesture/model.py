@@ -1,0 +1,145 @@
+"""EmotionGesture as a record of pure functions."""
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int, Key
+
+from a2g_jax.data.batch import Batch
+from a2g_jax.errors import InputError
+from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.emotion_gesture import chunks
+from a2g_jax.models.emotion_gesture.chunks import Given, State
+from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
+from a2g_jax.models.emotion_gesture.networks import Networks
+from a2g_jax.models.emotion_gesture.objective import discriminator_loss, generate, generator_loss, vae_loss
+from a2g_jax.models.emotion_gesture.sampling import AUDIO, LABEL, EmotionGestureSampling
+from a2g_jax.models.emotion_gesture.word_table import fill_table
+from a2g_jax.models.emotion_timeline import check_emotions, emotion_rows, parse_timeline
+from a2g_jax.models.optimiser import make_optimiser
+
+#: The emotion of the audio.
+_DEFAULT = EmotionGestureSampling()
+#: Adam's decay of the first moment (beta 1 of the authors' code).
+_MOMENTUM = 0.5
+
+
+def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSampling = _DEFAULT) -> Model:
+    """EmotionGesture for a corpus; see :class:`a2g_jax.models.base.Model` for its parts.
+
+    The transcript is a target of training alone (Eq. 2); generation takes none.
+
+    Raises:
+        InputError: a corpus without emotions, an emotion that it does not have, or one for a model that has no features
+            of it.
+    """
+    networks = Networks(config, data)
+    _check_sampling(networks, sampling)
+    conditioned = sampling.emotion == LABEL or sampling.names_emotions or config.branches == "label"
+    optimiser = partial(make_optimiser, momentum=_MOMENTUM)
+
+    def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
+        """The calmest pose of each clip, and its speed, mean change of a value over three frames."""
+        del params, key
+        speed = jnp.mean(jnp.abs(jnp.diff(networks.flat(batch.pose), axis=1)), axis=-1)
+        around = (speed[:, :-1] + speed[:, 1:]) / 2.0
+        calmest = jnp.argmin(around, axis=1)
+        rows = jnp.take_along_axis(batch.pose, (calmest + 1)[:, None, None, None], axis=1)[:, 0]
+        # Half precision: to a thousandth of a value, and half the size of the run.
+        return {"rest_pose": rows.astype(jnp.float16), "rest_speed": jnp.min(around, axis=1)}
+
+    def condition(params: Params, summary: Summary, given: Condition) -> Given:
+        """The audio of chunks, and the weights of the emotions; NaN for the audio's."""
+        del params, summary
+        audio, emotion = given.audio, given.emotion
+        if emotion is None:
+            emotion = jnp.full((len(audio), networks.classes), jnp.nan)
+        before = jnp.concatenate([jnp.repeat(audio[:1], config.seed_frames, axis=0), audio[: -config.seed_frames]])
+        return Given(audio, before, emotion)
+
+    def begin(
+        params: Params, summary: Summary, key: Key[Array, ""], seed_poses: Float[Array, "S R D"] | None = None
+    ) -> State:
+        """State before the first frame: after the seed poses, or in a rest pose of the corpus."""
+        del params
+        return chunks.start(networks, summary, key, seed_poses)
+
+    def proceed(
+        params: Params, summary: Summary, key: Key[Array, ""], given: Given, start: Int[Array, ""], state: State
+    ) -> tuple[Float[Array, "T R D"], State]:
+        """The next frames of a motion, and the state after them."""
+        del summary
+        values, state = chunks.proceed(networks, params, sampling, key, given, start, state)
+        return networks.pose(values[None])[0], state
+
+    def sample(
+        params: Params, summary: Summary, key: Key[Array, ""], given: Given, start: Int[Array, ""]
+    ) -> Float[Array, "T R D"]:
+        """A motion from frame ``start`` on, after a rest pose."""
+        padded = jax.tree.map(lambda array: jnp.pad(array, ((0, config.stride - 1), (0, 0)), mode="edge"), given)
+        return proceed(params, summary, key, padded, start, begin(params, summary, key))[0]
+
+    def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
+        """The clips as they are generated from their own first poses, with the emotion of their audio."""
+        return networks.pose(generate(networks, params, batch)[1])
+
+    def requested(frames: int) -> dict[str, Any]:
+        """Weights of the emotions that the sampling settings name."""
+        if not sampling.names_emotions:
+            return {}
+        text = sampling.emotion
+        return {"emotion": emotion_rows(parse_timeline(text), data.emotions, frames, data.fps, text)}
+
+    def use_words(params: Params, words: tuple[str, ...]) -> Params:
+        """Initial parameters with the pretrained vectors of the corpus's words."""
+        table = params["generator"]["text"]["vectors"]
+        filled = fill_table(np.asarray(table), config.word_vectors, words)
+        text = params["generator"]["text"] | {"vectors": jnp.asarray(filled)}
+        return params | {"generator": params["generator"] | {"text": text}}
+
+    updates = [Update(generator_loss(networks, True), ("generator",), "generator", optimiser)]
+    held_out = generator_loss(networks, False)
+    if config.adversarial_weight > 0:
+        game = discriminator_loss(networks, True)
+        updates = [Update(game, ("discriminator",), "discriminator", optimiser), *updates]
+    stages = [Stage(tuple(updates), validation_loss=held_out)]
+    if networks.samples_emotions:
+        stages.append(Stage((Update(vae_loss(networks), ("vae",)),), "emotion_vae", config.vae_steps))
+    reads = config.mines and config.beat_weight > 0
+    return Model(
+        "emotion_gesture",
+        config,
+        config.clip_frames,
+        max(config.seed_frames, config.stride - 1),
+        networks.init,
+        tuple(stages),
+        summarise,
+        batch_fields=("audio", "pose", "emotion", *(("words", "word_starts") if reads else ())),
+        use_words=use_words if reads and config.word_vectors else None,
+        condition=condition,
+        condition_fields=("audio", "seed_poses", *(("emotion",) if conditioned else ())),
+        requested=requested,
+        sample=sample,
+        begin=begin,
+        proceed=proceed,
+        seed_frames=config.seed_frames,
+        lookahead=config.stride - 1,
+        overlap=config.stride - 1,
+        reconstruct=reconstruct,
+    )
+
+
+def _check_sampling(networks: Networks, sampling: EmotionGestureSampling) -> None:
+    """Refuse an emotion that the model cannot show."""
+    text = sampling.emotion
+    if sampling.names_emotions:
+        check_emotions(parse_timeline(text), networks.data.emotions, text)
+    takes_labels = networks.config.branches == "label" and text != "sample"
+    if text not in (AUDIO, LABEL) and not networks.samples_emotions and not takes_labels:
+        raise InputError(
+            f"--emotion {text!r}: the run has no emotion-conditioned VAE to sample it from; train one with --vae-steps"
+            " above 0 and --branches emotion-beat."
+        )

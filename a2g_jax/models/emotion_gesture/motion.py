@@ -1,0 +1,59 @@
+"""The decoder of prompts to poses, and the discriminator of motion (Sec. III-C and III-D)."""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+from flax import linen as nn
+from jaxtyping import Array, Float
+
+from a2g_jax.models.emotion_gesture.mining import dense
+from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
+
+
+class PoseDecoder(nn.Module):
+    """Poses of all frames: layers in which the prompt attends to the audio (Eq. 5), and a perceptron.
+
+    Args:
+        values: numbers of a pose.
+        positions: whether prompts get a position encoding.
+    """
+
+    layers: int
+    heads: int
+    hidden: int
+    values: int
+    positions: bool
+    dropout: float
+
+    @nn.compact
+    def __call__(
+        self, prompt: Float[Array, "B N D"], audio: Float[Array, "B N D"], deterministic: bool
+    ) -> Float[Array, "B N C"]:
+        channels = prompt.shape[-1]
+        x = prompt
+        if self.positions:
+            x = x + jnp.asarray(sinusoids(x.shape[1], channels), x.dtype)[None]
+        for _ in range(self.layers):
+            x = PostNormLayer(channels, self.heads, self.hidden, self.dropout)(x, audio, deterministic)
+        for width in (4 * channels, channels):
+            x = nn.Dropout(self.dropout)(nn.relu(dense(width)(x)), deterministic=deterministic)
+        poses: Float[Array, "B N C"] = dense(self.values)(dense(self.values)(x))
+        return poses
+
+
+class Discriminator(nn.Module):
+    """A logit for each motion, positive for recorded ones; its input is the differences between frames."""
+
+    channels: int
+    layers: int
+    heads: int
+    hidden: Sequence[int]
+
+    @nn.compact
+    def __call__(self, offsets: Float[Array, "B N C"]) -> Float[Array, " B"]:
+        x = Encoder(self.layers, self.heads, 4 * self.channels, 0.0)(dense(self.channels)(offsets), True)
+        x = nn.relu(dense(self.channels // 2)(x)).reshape(len(offsets), -1)
+        for width in self.hidden:
+            x = nn.relu(dense(width)(x))
+        logits: Float[Array, "B 1"] = dense(1)(x)
+        return logits[:, 0]

@@ -1,0 +1,176 @@
+"""The networks of EmotionGesture as functions of parameters."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, Key
+
+from a2g_jax.errors import InputError
+from a2g_jax.models.base import Data, Params
+from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
+from a2g_jax.models.emotion_gesture.mining import AudioEncoder, EmotionClassifier, Projector, TextEncoder, unmined
+from a2g_jax.models.emotion_gesture.motion import Discriminator, PoseDecoder
+from a2g_jax.models.emotion_gesture.prompter import PosePrompter
+from a2g_jax.models.emotion_gesture.vae import FeatureDecoder, FeatureEncoder
+from a2g_jax.nn.transformer import Encoder
+
+#: Source of dropout: None for none.
+DropoutKey = Key[Array, ""] | None
+
+
+class AudioFeatures(NamedTuple):
+    """Features of the audio of clips."""
+
+    beat: Float[Array, "B N D"]
+    """Beat features, or the audio's features where nothing is mined."""
+    emotion: Float[Array, "B N D"] | None = None
+    """Emotion features."""
+    logits: Float[Array, "B E"] | None = None
+    """Of the emotion classifier."""
+
+
+class Networks:
+    """Modules for a corpus, and their application; parameters go in and arrays come out."""
+
+    def __init__(self, config: EmotionGestureConfig, data: Data) -> None:
+        """
+        Raises:
+            InputError: a corpus without emotions for a label.
+        """
+        c = config
+        if not data.emotions:
+            raise InputError("emotion_gesture: the corpus has no emotions; prepare one with labels.")
+        self.config, self.data = c, data
+        self.rows = data.pose_statistics.mean.shape
+        self.values = self.rows[0] * self.rows[1]
+        self.classes = len(data.emotions)
+        self.normalised = c.normalise_pose or not data.space.unit_scale
+        modules = {
+            "audio": AudioEncoder(c.audio_blocks, c.audio_channels, c.channels, c.header, data.spectra, c.dropout),
+            "fusion": Projector(c.channels, c.dropout),
+            "encoder": Encoder(c.layers, c.heads, c.hidden, c.dropout),
+            "prompter": PosePrompter(
+                c.channels, c.clip_frames, c.transition_frames, c.prompter, c.prompt_space, c.scaled_scores, c.dropout
+            ),
+            "decoder": PoseDecoder(c.layers, c.heads, c.hidden, self.values, c.query_positions, c.dropout),
+        }
+        if c.mines:
+            modules["emotion"] = Projector(c.channels, c.dropout)
+            modules["beat"] = Projector(c.channels, c.dropout)
+            modules["classifier"] = EmotionClassifier(c.emotion_hidden, self.classes, c.emotion_pool)
+        if c.mines and c.beat_weight > 0:
+            modules["text"] = TextEncoder(c.word_buckets, c.word_width, c.word_layers, c.channels, c.dropout)
+        self._generator: dict[str, Any] = modules
+        self._discriminator = Discriminator(
+            c.discriminator_channels, c.discriminator_layers, c.heads, c.discriminator_hidden
+        )
+        self._vae_encoder = FeatureEncoder(c.vae_channels, c.vae_latent)
+        self._vae_decoder = FeatureDecoder(c.vae_channels, c.clip_frames, c.channels)
+        self.samples_emotions = c.mines and c.vae_steps > 0
+
+    def init(self, key: Key[Array, ""]) -> Params:
+        """Initial parameters: ``generator``, and ``discriminator`` and ``vae`` where the settings have them."""
+        c = self.config
+        audio = jnp.zeros((1, c.clip_frames, self.data.audio_bands))
+        rows = jnp.zeros((1, c.clip_frames, c.channels))
+        labelled = c.channels + (self.classes if c.branches == "label" else 0)
+        words = jnp.zeros((1, c.clip_frames), jnp.int32)
+        inputs: dict[str, tuple[Any, ...]] = {
+            "audio": (audio, True),
+            "emotion": (rows, True),
+            "beat": (rows, True),
+            "classifier": (rows,),
+            "text": (words, True),
+            "fusion": (jnp.zeros((1, c.clip_frames, labelled)), True),
+            "encoder": (rows, True),
+            "prompter": (jnp.zeros((1, c.seed_frames, self.values)), True),
+            "decoder": (rows, rows, True),
+        }
+        params: Params = {
+            "generator": {
+                name: module.init(jax.random.fold_in(key, number), *inputs[name])["params"]
+                for number, (name, module) in enumerate(self._generator.items())
+            }
+        }
+        if c.adversarial_weight > 0:
+            offsets = jnp.zeros((1, c.clip_frames - 1, self.values))
+            params["discriminator"] = self._discriminator.init(jax.random.fold_in(key, 100), offsets)["params"]
+        if self.samples_emotions:
+            label, latent = jnp.zeros((1, self.classes)), jnp.zeros((1, c.vae_latent))
+            params["vae"] = {
+                "encoder": self._vae_encoder.init(jax.random.fold_in(key, 101), rows, label)["params"],
+                "decoder": self._vae_decoder.init(jax.random.fold_in(key, 102), latent, label)["params"],
+            }
+        return params
+
+    def flat(self, pose: Float[Array, "B N R D"]) -> Float[Array, "B N C"]:
+        """Poses as networks and losses have them."""
+        pose = self.data.pose_statistics.normalise(pose) if self.normalised else pose
+        return pose.reshape(*pose.shape[:2], self.values)
+
+    def pose(self, values: Float[Array, "B N C"]) -> Float[Array, "B N R D"]:
+        """Inverse of :meth:`flat`."""
+        pose = values.reshape(*values.shape[:2], *self.rows)
+        return self.data.pose_statistics.denormalise(pose) if self.normalised else pose
+
+    def encode_audio(self, params: Params, audio: Float[Array, "B N bands"], key: DropoutKey = None) -> AudioFeatures:
+        """Beat features and emotion features of audio (EBM)."""
+        features = self._apply(params, "audio", key, audio)
+        if not self.config.mines:
+            return AudioFeatures(features)
+        emotion = self._apply(params, "emotion", key, features)
+        logits: Any = self._generator["classifier"].apply({"params": params["generator"]["classifier"]}, emotion)
+        return AudioFeatures(self._apply(params, "beat", key, features), emotion, logits)
+
+    def encode_text(self, params: Params, words: Int[Array, "B N"], key: DropoutKey = None) -> Float[Array, "B N D"]:
+        """Features of a transcript; see :class:`~a2g_jax.models.emotion_gesture.mining.TextEncoder`."""
+        return self._apply(params, "text", key, words)
+
+    def decode(
+        self,
+        params: Params,
+        audio: AudioFeatures,
+        seed: Float[Array, "B M C"],
+        labels: Float[Array, "B N E"] | None = None,
+        key: DropoutKey = None,
+    ) -> Float[Array, "B N C"]:
+        """Poses of a clip that begins with the initial poses ``seed``, those included.
+
+        Args:
+            labels: weights of the emotions, for the ablation that takes them.
+        """
+        if audio.emotion is not None:
+            mixed = audio.beat + audio.emotion
+        else:
+            mixed = unmined(audio.beat, labels if self.config.branches == "label" else None)
+        fused = self._apply(params, "fusion", key, mixed)
+        memory = self._apply(params, "encoder", key, fused)
+        prompt = self._apply(params, "prompter", key, seed)
+        return self._apply(params, "decoder", key, prompt, memory)
+
+    def judge(self, params: Params, motion: Float[Array, "B N C"]) -> Float[Array, " B"]:
+        """The discriminator's logits of motions."""
+        logits: Any = self._discriminator.apply({"params": params["discriminator"]}, jnp.diff(motion, axis=1))
+        return logits
+
+    def encode_emotion(
+        self, params: Params, features: Float[Array, "B N D"], label: Float[Array, "B E"]
+    ) -> tuple[Float[Array, "B Z"], Float[Array, "B Z"]]:
+        """Mean and log-variance of the VAE's latents."""
+        found: Any = self._vae_encoder.apply({"params": params["vae"]["encoder"]}, features, label)
+        return found
+
+    def decode_emotion(
+        self, params: Params, latent: Float[Array, "B Z"], label: Float[Array, "B E"]
+    ) -> Float[Array, "B N D"]:
+        """Emotion features of latents."""
+        features: Any = self._vae_decoder.apply({"params": params["vae"]["decoder"]}, latent, label)
+        return features
+
+    def _apply(self, params: Params, name: str, key: DropoutKey, *inputs: Array) -> Any:
+        module, own = self._generator[name], {"params": params["generator"][name]}
+        if key is None or self.config.dropout == 0:
+            return module.apply(own, *inputs, True)
+        number = list(self._generator).index(name)
+        return module.apply(own, *inputs, False, rngs={"dropout": jax.random.fold_in(key, number)})

@@ -1,0 +1,112 @@
+"""The objective of EmotionGesture (Eq. 9) as losses of updates, and that of the emotion-conditioned VAE."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import optax
+from jaxtyping import Array, Float, Int, Key
+
+from a2g_jax.data.batch import Batch
+from a2g_jax.models.base import Params
+from a2g_jax.models.emotion_gesture import losses, vae
+from a2g_jax.models.emotion_gesture.mining import start_words
+from a2g_jax.models.emotion_gesture.networks import AudioFeatures, DropoutKey, Networks
+
+Terms = dict[str, Array]
+
+
+def one_hot(networks: Networks, batch: Batch) -> Float[Array, "B E"]:
+    """Labels of the clips."""
+    assert batch.emotion is not None
+    return jax.nn.one_hot(batch.emotion, networks.classes)
+
+
+def generate(
+    networks: Networks, params: Params, batch: Batch, key: DropoutKey = None
+) -> tuple[AudioFeatures, Float[Array, "B N C"], Float[Array, "B N C"]]:
+    """The features of the audio of clips, their generated motions from their first poses on, and the true ones."""
+    config = networks.config
+    target = networks.flat(batch.pose)
+    audio = networks.encode_audio(params, batch.audio, key)
+    labels = None
+    if config.branches == "label":
+        label = one_hot(networks, batch)[:, None]
+        labels = jnp.broadcast_to(label, (len(label), config.clip_frames, networks.classes))
+    return audio, networks.decode(params, audio, target[:, : config.seed_frames], labels, key), target
+
+
+def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
+    """The generator's loss: Eq. 9 with the generator's side of Eq. 8.
+
+    Args:
+        training: with dropout.
+    """
+    config = networks.config
+
+    def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
+        del step
+        dropout = key if training else None
+        audio, made, target = generate(networks, params, batch, dropout)
+        terms = {"reconstruction": losses.reconstruction(target, made)}
+        weights = {"reconstruction": config.reconstruction_weight}
+        if config.smooth_weight > 0:
+            terms["smooth"] = losses.motion_smooth(target, made, config.smooth_temperature)
+            weights["smooth"] = config.smooth_weight
+        if config.adversarial_weight > 0:
+            frozen = params | {"discriminator": jax.lax.stop_gradient(params["discriminator"])}
+            terms["adversarial"] = losses.generator_adversarial(networks.judge(frozen, made))
+            weights["adversarial"] = config.adversarial_weight
+        if audio.logits is not None and config.emotion_weight > 0:
+            assert batch.emotion is not None
+            entropy = optax.softmax_cross_entropy_with_integer_labels(audio.logits, batch.emotion)
+            terms["emotion"] = jnp.mean(entropy)
+            weights["emotion"] = config.emotion_weight
+        if batch.words is not None and batch.word_starts is not None:
+            text = networks.encode_text(params, start_words(batch.words, batch.word_starts), dropout)
+            terms["beat"] = losses.beat_alignment(
+                text, audio.beat, batch.word_starts, config.beat_temperature, config.beat_form
+            )
+            weights["beat"] = config.beat_weight
+        total = sum((weights[name] * terms[name] for name in weights), start=jnp.zeros(()))
+        if audio.logits is not None and batch.emotion is not None:
+            right = jnp.argmax(audio.logits, axis=-1) == batch.emotion
+            terms["emotion_accuracy"] = jnp.mean(right.astype(jnp.float32))
+        return total, terms
+
+    return loss
+
+
+def discriminator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
+    """The discriminator's side of Eq. 8; the generator is a constant.
+
+    Args:
+        training: with dropout in the generator.
+    """
+
+    def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
+        del step
+        frozen = params | {"generator": jax.lax.stop_gradient(params["generator"])}
+        _, made, target = generate(networks, frozen, batch, key if training else None)
+        real, fake = jnp.split(networks.judge(params, jnp.concatenate([target, made])), 2)
+        value = losses.discriminator_adversarial(real, fake)
+        return value, {"discriminator": value}
+
+    return loss
+
+
+def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
+    """Relative squared error of emotion features and the KL divergence; everything else is a constant."""
+    config = networks.config
+
+    def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
+        del step
+        frozen = jax.lax.stop_gradient(params)
+        features, label = networks.encode_audio(frozen, batch.audio).emotion, one_hot(networks, batch)
+        assert features is not None
+        mean, log_variance = networks.encode_emotion(params, features, label)
+        made = networks.decode_emotion(params, vae.draw(key, mean, log_variance), label)
+        terms = {"vae_error": vae.relative_error(features, made), "vae_kl": vae.divergence(mean, log_variance)}
+        return terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"], terms
+
+    return loss

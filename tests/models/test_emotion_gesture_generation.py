@@ -1,0 +1,153 @@
+"""EmotionGesture in generation: chunks, windows, seed poses, seams and emotions."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_data, make_params
+
+from a2g_jax.data.batch import Batch
+from a2g_jax.errors import InputError
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.statistics import Statistics
+from a2g_jax.generation.engine import Engine
+from a2g_jax.models.base import Condition
+from a2g_jax.models.emotion_gesture.model import build
+from a2g_jax.models.emotion_gesture.sampling import EmotionGestureSampling
+from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.run import Run, RunConfig
+
+FRAMES = 300
+#: Seams are left as generated, and chunks are not a divisor of the windows.
+CHUNKS = replace(CONFIG, clip_frames=13)
+
+
+def make_run(sampling=None, config=CHUNKS, seed=3):
+    """A run with drawn weights, and a summary of ten rest poses."""
+    data = make_data()
+    random = np.random.default_rng(1)
+    params = jax.tree.map(np.asarray, make_params(build(config, data), seed=seed))
+    summary = {
+        "rest_pose": random.normal(size=(10, JOINTS, 6)).astype(np.float16),
+        "rest_speed": random.uniform(size=10).astype(np.float32),
+    }
+    bands = data.audio_bands
+    statistics = {
+        "audio": Statistics(np.zeros(bands, np.float32), np.ones(bands, np.float32)),
+        "pose": data.pose_statistics,
+        "root": Statistics(np.zeros(3, np.float32), np.ones(3, np.float32)),
+    }
+    described = RunConfig(
+        "emotion_gesture",
+        "tiny",
+        config,
+        TrainConfig(),
+        15.0,
+        MelConfig(bands=bands // data.spectra, stack=data.spectra),
+        data.space,
+        statistics,
+        {"emotions": list(EMOTIONS), "speakers": [], "fingerprint": ""},
+        sampling=sampling or EmotionGestureSampling(),
+    )
+    return Run(described, params, summary, 0)
+
+
+@pytest.fixture(scope="module")
+def audio():
+    return np.random.default_rng(2).normal(size=(FRAMES, 12)).astype(np.float32)
+
+
+def rows(run, audio, samples=1, window=128, **given):
+    """Motions by the window loop."""
+    return np.stack(list(Engine(run, window).rows(Condition(audio, **given), samples, 0)))
+
+
+@pytest.mark.parametrize("emotion", ["audio", "sample", "neutral@0,anger@12.5"])
+def test_windows_of_any_size_agree(audio, emotion):
+    run = make_run(EmotionGestureSampling(emotion, seam_frames=4))
+    small, large = rows(run, audio, window=128), rows(run, audio, window=384)
+    assert small.shape == (1, FRAMES, JOINTS, 6)
+    np.testing.assert_allclose(small, large, atol=2e-5)
+
+
+@pytest.mark.parametrize("seam", [0, 5])
+def test_it_is_the_chunks_one_after_another(audio, seam):
+    """The window loop against a loop over chunks: each is a clip that begins with the last poses before it."""
+    run = make_run(EmotionGestureSampling(seam_frames=seam))
+    seeds = np.random.default_rng(4).normal(size=(9, JOINTS, 6)).astype(np.float32)
+    ours = rows(run, audio, seed_poses=seeds)[0]
+    first, chunk = CHUNKS.seed_frames, CHUNKS.stride
+    silence = lambda frames: np.full((frames, audio.shape[1]), audio.min(), np.float32)  # noqa: E731
+    padded = np.concatenate([silence(first), audio, silence(chunk)])
+    space, statistics = run.config.space, run.config.statistics["pose"]
+    last, made = seeds[-first:], []
+    reconstruct = jax.jit(run.config.build().reconstruct)
+    for start in range(0, FRAMES, chunk):
+        poses = np.concatenate([last, np.zeros((chunk, JOINTS, 6), np.float32)])
+        batch = Batch(jnp.asarray(padded[start : start + CHUNKS.clip_frames][None]), jnp.asarray(poses[None]))
+        found = statistics.normalise(np.asarray(reconstruct(run.params, batch))[0])
+        offset = statistics.normalise(last)[-1] - found[first - 1]
+        shares = np.array([max(0.0, 1.0 - (frame + 1) / (seam + 1)) for frame in range(chunk)])
+        shares = shares**2 * (3 - 2 * shares) if seam else 0 * shares
+        new = found[first:] + shares[:, None, None] * offset
+        new = np.asarray(space.valid(jnp.asarray(statistics.denormalise(new), jnp.float32)))
+        last = np.concatenate([last, new])[-first:]
+        made.append(new)
+    np.testing.assert_allclose(ours, np.concatenate(made)[:FRAMES], atol=2e-4)
+
+
+def test_samples_do_not_depend_on_their_number_and_differ_by_their_first_pose(audio):
+    run = make_run()
+    two, five = rows(run, audio[:40], 2), rows(run, audio[:40], 5)
+    np.testing.assert_array_equal(two, five[:2])
+    # A tenth of ten poses is one: without drawn emotions all motions are then the same.
+    np.testing.assert_allclose(five[0], five[3], atol=1e-6)
+    drawn = rows(make_run(EmotionGestureSampling("anger")), audio[:40], 2)
+    assert np.abs(drawn[0] - drawn[1]).max() > 1e-3
+    still = rows(make_run(EmotionGestureSampling("anger", temperature=0.0)), audio[:40], 2)
+    np.testing.assert_allclose(still[0], still[1], atol=1e-6)
+
+
+def test_named_emotions_reach_the_motion_at_their_time(audio):
+    neutral, timeline = (
+        rows(make_run(EmotionGestureSampling(text, seam_frames=0)), audio)[0]
+        for text in ("neutral", "neutral@0,anger@12")
+    )
+    apart = np.abs(neutral - timeline).max(axis=(1, 2))
+    change = 12 * 15
+    assert apart[: change - CHUNKS.stride].max() < 1e-6
+    assert apart[change + 10 :].min() > 1e-4
+
+
+def test_labels_of_the_caller_and_where_they_are_refused(audio):
+    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
+    labelled = rows(make_run(EmotionGestureSampling("label")), audio, emotion=weights)
+    np.testing.assert_allclose(labelled, rows(make_run(EmotionGestureSampling("anger")), audio), atol=1e-6)
+    # Without labels it is the emotion of the audio.
+    np.testing.assert_allclose(
+        rows(make_run(EmotionGestureSampling("label")), audio), rows(make_run(), audio), atol=1e-6
+    )
+    with pytest.raises(InputError, match="emotion_gesture: takes no emotion; it is conditioned on audio, seed_poses"):
+        rows(make_run(), audio, emotion=weights)
+    with pytest.raises(InputError, match=r"second 30 is past the end of the speech, which lasts 20.00 s"):
+        rows(make_run(EmotionGestureSampling("neutral@0,anger@30")), audio)
+
+
+def test_the_ablation_with_labels_follows_them(audio):
+    config = replace(CHUNKS, branches="label")
+    made = [
+        rows(make_run(EmotionGestureSampling(text), config), audio[:40]) for text in ("audio", "anger", "happiness")
+    ]
+    assert np.abs(made[1] - made[2]).max() > 1e-3
+    assert np.abs(made[0] - made[1]).max() > 1e-3
+
+
+def test_a_motion_without_seed_poses_begins_in_one_of_the_calm_poses(audio):
+    run = make_run(EmotionGestureSampling(seam_frames=0))
+    calm = int(np.argmin(run.summary["rest_speed"]))
+    seeds = np.tile(run.summary["rest_pose"][calm].astype(np.float32), (CHUNKS.seed_frames, 1, 1))
+    np.testing.assert_allclose(rows(run, audio[:40]), rows(run, audio[:40], seed_poses=seeds), atol=1e-6)
+    with pytest.raises(InputError, match="the seed poses are 3 frames; the run needs 4 or more"):
+        rows(run, audio[:40], seed_poses=seeds[:3])
