@@ -88,7 +88,8 @@ def cases(runs: dict[str, Run], speeches: dict[str, Path], clips: dict[str, Path
         for number, flags in enumerate(_pins(clips)):
             absurd = any(key in flags[1] for key in map(_file, ABSURD))
             yield Case(name, "absurd pins" if absurd else "pins", speech, flags, 2, number)
-        for number, flags in enumerate(_styles(clips)):
+        # A run without latents of frames refuses all styles for one reason.
+        for number, flags in enumerate(_styles(clips) if run.config.build().encode else ()):
             absurd = any(key in flags[1] for key in map(_file, ABSURD))
             samples = 1 if "--style-share" in flags and flags[flags.index("--style-share") + 1] == "1" else 2
             yield Case(name, "absurd styles" if absurd else "styles and seed clips", speech, flags, samples, number)
