@@ -15,6 +15,7 @@ import argparse
 import contextlib
 import hashlib
 import io
+import re
 import shutil
 import time
 from collections import Counter
@@ -26,7 +27,7 @@ import numpy as np
 from a2g_jax import __version__
 from a2g_jax.cli import main as command_line
 from a2g_jax.generation.clips import read_on_skeleton
-from a2g_jax.generation.generator import Generator
+from a2g_jax.generation.generator import Generator, plant_rotations
 from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.io.files import read_json, sha256_file, write_json
 from a2g_jax.metrics.body.bounds import anybody
@@ -108,7 +109,8 @@ def _generated(case: Case, speeches: dict[str, Path], judge: Judge, out: Path) -
     row: dict[str, Any] = {"case": case.name, "run": case.run, "group": case.group, "status": status}
     if status != 0:
         last = errors.getvalue().strip().splitlines()[-1:]
-        return row | {"refused": last[0].split("\r")[-1] if last else ""}
+        # Folders differ from machine to machine.
+        return row | {"refused": re.sub(r"\S*/", "", last[0].split("\r")[-1]) if last else ""}
     reports = read_json(out / "checks.json")["samples"]
     outside, missing = unreported(out, judge)
     lines = [line for line in printed.getvalue().splitlines() if line.startswith("sample ") and "BODY" in line]
@@ -142,11 +144,15 @@ def _truth(run: Run) -> dict[str, Any]:
 
 
 def _people(run: Run, folder: Path) -> dict[str, Any]:
-    """Findings on the takes of real people on the run's body: against its bounds, and against those of any person."""
+    """Findings on the takes of real people on the run's body: against its bounds, and against those of any person.
+
+    Their feet are planted as those of all generated motion; the root of BEAT's takes does not stand on a floor.
+    """
     config, found = run.config, {}
     facing = np.asarray(config.space.mean_rotations(config.statistics["pose"].mean)[0], np.float64)
     for name, path in REAL_CLIPS.items():
-        motion = face(read_on_skeleton(folder / path, config.skeleton, config.fps), facing)[0]
+        take = face(read_on_skeleton(folder / path, config.skeleton, config.fps), facing)[0]
+        motion = plant_rotations(run, np.asarray(take.rotations))
         for source, bounds in (("run", config.body_bounds), ("any person", anybody(config.body_reference))):
             findings = check_motion(motion, bounds)
             found[f"{name}, {source}"] = {

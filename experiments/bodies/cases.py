@@ -18,7 +18,7 @@ RATE = 16_000
 SECONDS, LONG = 12.0, 60.0
 SEED = 3100
 #: Low and high values of a control, as ``--control`` takes them.
-LOW, HIGH = "5", "95"
+LOW, HIGH = "0.05", "0.95"
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,8 @@ def cases(runs: dict[str, Run], speeches: dict[str, Path], clips: dict[str, Path
         for number, flags in enumerate(_pins(clips)):
             absurd = any(key in flags[1] for key in map(_file, ABSURD))
             yield Case(name, "absurd pins" if absurd else "pins", speech, flags, 2, number)
-        for number, flags in enumerate(_styles(clips)):
+        # A run without latents of frames refuses all styles for one reason.
+        for number, flags in enumerate(_styles(clips) if run.config.build().encode else ()):
             absurd = any(key in flags[1] for key in map(_file, ABSURD))
             samples = 1 if "--style-share" in flags and flags[flags.index("--style-share") + 1] == "1" else 2
             yield Case(name, "absurd styles" if absurd else "styles and seed clips", speech, flags, samples, number)
@@ -113,11 +114,16 @@ def _settings(run: Run) -> Iterator[tuple[str, ...]]:
             flag = {"edits": "--edit"}.get(name, f"--{name.replace('_', '-')}")
             yield from ((flag, value) for value in chosen)
     controls = run.config.build().controls
+    # Models that name the values of a control, such as emotions, list them.
+    named = getattr(controls, "categories", {})
     for name in controls.names if controls else ():
+        if name in named:
+            yield from (("--control", f"{name}={value}") for value in named[name])
+            continue
         yield from (("--control", f"{name}={value}") for value in (LOW, HIGH))
-        yield "--control", f"{name}={LOW}@0 {HIGH}@6 {LOW}@12"
+        yield "--control", f"{name}={LOW}@0,{HIGH}@6,{LOW}@12"
     if controls:
-        yield tuple(part for name in controls.names for part in ("--control", f"{name}={HIGH}"))
+        yield tuple(part for name in controls.names if name not in named for part in ("--control", f"{name}={HIGH}"))
 
 
 def _pins(clips: dict[str, Path]) -> Iterator[tuple[str, ...]]:
