@@ -1,4 +1,4 @@
-"""How closely clips that are pinned through their codes are followed, and how smooth the seams are (extended, Sec. 6.4).
+"""How closely clips pinned through their codes are followed, and how smooth the seams are (extended, Sec. 6.4).
 
     python -m experiments.audio2gestures.pins RUN --corpus CORPUS [--pins 40] [--seed 0]
 

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 #: Frames of a clip that the velocity and acceleration of an offset are taken from.
 NEAR = 3
-#: Acceleration from which a joint shakes, radians (or metres) per frame squared; talk at 30 fps has up to 0.17. Its mean
-#: velocity is continued then.
+#: Acceleration from which a joint shakes, radians (or metres) per frame squared; talk at 30 fps has up to 0.17. Its
+#: mean velocity is continued then.
 SHAKES = 0.22
 
 
