@@ -1,4 +1,4 @@
-"""How closely pinned clips are followed, and how smooth their seams are (Audio2Gestures, extended, Sec. 6.4).
+"""How closely clips pinned through their codes are followed, and how smooth the seams are (extended, Sec. 6.4).
 
     python -m experiments.audio2gestures.pins RUN --corpus CORPUS [--pins 40] [--seed 0]
 
@@ -31,7 +31,7 @@ from experiments.tables.records import results
 SECONDS = 12.0
 #: Seconds of blending, and weight of the clip's own shared code.
 SETTINGS = ((0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (0.75, 0.0))
-#: Share of the unpinned distance below which wrists count in ``wrists_followed``.
+#: A pin counts as followed if its distance is below this share of the unpinned motion's.
 FOLLOWED = 0.5
 ERRORS = ("error_cm", "unpinned_error_cm", "wrist_error_cm", "unpinned_wrist_error_cm")
 
@@ -39,7 +39,8 @@ ERRORS = ("error_cm", "unpinned_error_cm", "wrist_error_cm", "unpinned_wrist_err
 def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, shared: float) -> dict[str, Any]:
     """Errors of pinned and unpinned samples, and jerk at the seams compared with the corpus's 99th percentile."""
     space, limit = LatentSpace(run), corpus_jerk(corpus)
-    ends = Ends(round(blend * run.config.fps), round(blend * run.config.fps))
+    reach = round(blend * run.config.fps)
+    ends = Ends(reach, reach, reach)
     facing = np.asarray(matrix_from_6d(np.asarray(run.config.statistics["pose"].mean[0])), np.float64)
     rng = np.random.default_rng(seed)
     rows, unpinned, recorded = [], [], []
@@ -68,7 +69,7 @@ def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, share
         "speakers": min(count, len(SPEAKERS)),
         **means,
         **{name: bootstrap_mean(values, rng)._asdict() for name, values in share.items()},
-        "followed": float(np.mean([row["followed"] for row in rows])),
+        "followed": float(np.mean(share["share"] < FOLLOWED)),
         "wrists_followed": float(np.mean(share["wrist_share"] < FOLLOWED)),
         "seam_jerk_median": float(np.median([row["seam_jerk"] for row in rows])),
         "jerk_limit": limit,

@@ -55,9 +55,9 @@ def put(plain, run, *pins, length=None):
     return perform(plain, pins, standing, LIMIT, length)
 
 
-def smooth_turns(rng, frames, scale):
+def smooth_turns(rng, frames, scale, apart=60):
     """Random local rotations that change smoothly, up to long ways round."""
-    knots = rng.normal(0.0, scale, (1 + frames // 10 + 3, 22, 3))
+    knots = rng.normal(0.0, scale, (frames // apart + 3, 22, 3))
     times = np.linspace(0, len(knots) - 1, frames)
     rows = np.floor(times).astype(int).clip(0, len(knots) - 2)
     share = (times - rows)[:, None, None]

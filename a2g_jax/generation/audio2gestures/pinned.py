@@ -75,7 +75,7 @@ class Pinned:
             if limit is None:
                 limit, source = own_limit([plain, *(pin.motion for pin in self.pins)]), OF_MOTIONS
             blend = round(self.request.blend * motion.fps)
-            self.reports.append(report_pins(self.pins, motion, plain, limit, source, Ends(blend, blend)))
+            self.reports.append(report_pins(self.pins, motion, plain, limit, source, Ends(blend, blend, blend)))
             yield motion
 
     def lane(self) -> "Track":

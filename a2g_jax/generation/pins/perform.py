@@ -12,12 +12,15 @@ from a2g_jax.generation.pins.request import Pin
 from a2g_jax.generation.pins.transitions import Limits, Seam, Transition, plan
 from a2g_jax.geometry.footholds import reach_goals
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.metrics.hands import hand_speeds, local_places
 
 #: Shortest transition of a clip with feet of its own, seconds: two steps, one after the other.
 _TWO_STEPS = 0.8
 #: Top speed of hands that counts for a clip that is calmer, m/s: else they would take seconds to come to it.
 _CALM = 0.5
+#: Fastest turn of a joint that is ordinary, degrees per second.
+_TURN = 900.0
 #: Frames at either end of a changed stretch over which the root's lowering begins and ends.
 _EDGE = 6
 
@@ -104,7 +107,8 @@ def _place(
             own = replace(clip_feet, places=clip_feet.places + shift)
         clip = replace(clip, root=(np.asarray(clip.root, np.float64) + shift).astype(np.float32))
     top = hand_speeds(local_places(clip), clip.skeleton, clip.fps).max(initial=0.0)
-    limits = Limits(jerk, ROUGH_SPEED * max(float(top), _CALM))
+    turns = rotation_angle(np.asarray(clip.rotations)[1:], np.asarray(clip.rotations)[:-1]).max() * clip.fps
+    limits = Limits(jerk, ROUGH_SPEED * max(float(top), _CALM), max(float(turns), _TURN))
     left = pins[number - 1].stop if number > 0 else 0
     right = pins[number + 1].first if number + 1 < len(pins) else plain.frames
     least = 0.0 if own is None else _TWO_STEPS

@@ -27,6 +27,8 @@ class Ends(NamedTuple):
 
     before: int
     after: int
+    inside: int = 0
+    """Frames inside the clip, at either end, that a transition changes too."""
 
 
 def corpus_jerk(corpus: Corpus, percentile: float = 99.0) -> float:
@@ -88,10 +90,11 @@ def report_pins(
         # Seams lie before the first and after the last frame of a pin, none at the ends of the motion. Value k of the
         # jerk is of frames k to k + 3.
         parts = []
+        inside = max(end.inside, least)
         if pin.first > 0:
-            parts.append((pin.first - max(end.before, least), pin.first + least))
+            parts.append((pin.first - max(end.before, least), pin.first + inside))
         if pin.stop < pinned.frames:
-            parts.append((pin.stop - least, pin.stop + max(end.after, least)))
+            parts.append((pin.stop - inside, pin.stop + max(end.after, least)))
         seam, own = (
             max((float(values[max(0, low - 2) : high].max(initial=0.0)) for low, high in parts), default=0.0)
             for values in (jerks, plain_jerks)

@@ -111,11 +111,12 @@ def pin_of(
     if calibration := leading_t_pose(motion):
         notes.append(f"its first {calibration / motion.fps:.2f} s, a T-pose for calibration, are left out")
         motion = motion.clip(calibration, motion.frames)
-    frames = round(motion.seconds * config.fps)
+    # No frame beyond the last one of the clip, which would be held there and stop the motion.
+    frames = int((motion.frames - 1) * config.fps / motion.fps + 1e-6) + 1
     if length is not None:
-        frames = round(length * config.fps)
-        if frames > round(motion.seconds * config.fps):
+        if round(length * config.fps) > round(motion.seconds * config.fps):
             raise InputError(f"{text}: the clip lasts {motion.seconds:.2f} s; request no more than that.")
+        frames = min(frames, round(length * config.fps))
         motion = motion.clip(0, min(motion.frames, int(np.ceil(length * motion.fps)) + 1))
     # Repaired at its own rate: resampling would spread a flip over frames.
     motion, repairs = repair_flips(motion)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.generation.pins.offsets import NEAR, Shape, decay, offset_vectors, turned
+from a2g_jax.generation.pins.offsets import NEAR, Shape, bridge, decay, offset_vectors, turned
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.metrics.hands import hand_jerk, hand_speeds, local_places
 
 #: Lengths of a transition that are tried, seconds; times in which velocities come to rest.
@@ -16,17 +17,21 @@ LENGTHS = (0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0)
 SETTLE = (0.25, 0.5, 2.0)
 #: Share of the limits from which a longer transition is tried: one at the limits is abrupt.
 _COMFORT = 0.7
+#: Weight of all ratios beside the largest.
+_OTHERS = 0.3
 #: Ratio of costs at which the shorter of two transitions is taken.
 _ALIKE = 1.05
 
 
 class Limits(NamedTuple):
-    """Limits on the hands in a transition."""
+    """Limits on hands and joints in a transition."""
 
     jerk: float
     """m/s3"""
     speed: float
     """m/s"""
+    turn: float
+    """Of any joint, degrees per second."""
 
 
 class Seam(NamedTuple):
@@ -71,20 +76,48 @@ def plan(
         length: seconds; None to choose.
         least: shortest length to choose.
     """
-    inside = seam.edge - seam.step * np.arange(min(NEAR, clip.frames))
-    near = offset_vectors(
-        np.asarray(clip.rotations, np.float64)[inside - first], np.asarray(plain.rotations, np.float64)[inside]
-    )
-    root = np.asarray(clip.root, np.float64)[inside - first] - np.asarray(plain.root, np.float64)[inside]
-    tried = []
-    for shape in _shapes(seam, plain.fps, length, least):
-        found = Transition(seam, shape, decay(near, shape), decay(root, shape))
-        cost = _cost(plain, clip, first, found, limits)
-        if cost <= _COMFORT:
+    tried: list[tuple[float, Transition]] = []
+    for found in _candidates(plain, clip, first, seam, length, least):
+        ratios = _ratios(plain, clip, first, found, limits)
+        if max(ratios) <= _COMFORT:
             return found
-        tried.append((cost, found))
+        # The others count too: a clip that shakes at its end has the same largest ratio in every transition.
+        tried.append((max(ratios) + _OTHERS * sum(ratios), found))
     lowest = min(cost for cost, _ in tried)
     return next(found for cost, found in tried if cost <= _ALIKE * lowest)
+
+
+def _candidates(
+    plain: Motion, clip: Motion, first: int, seam: Seam, length: float | None, least: float
+) -> Iterator[Transition]:
+    """Transitions, the most faithful first: onto the moving motion, straight to where it is later, with less exact
+    velocities."""
+    inside = seam.edge - seam.step * np.arange(min(NEAR, clip.frames))
+    rotations, root = (np.asarray(values, np.float64) for values in (plain.rotations, plain.root))
+    turns, places = np.asarray(clip.rotations, np.float64)[inside - first], np.asarray(clip.root)[inside - first]
+    near, root_near = offset_vectors(turns, rotations[inside]), places - root[inside]
+    shapes = list(_shapes(seam, plain.fps, length, least))
+    for order in (2, 1):
+        for one in shapes:
+            shape = replace(one, order=order)
+            yield Transition(seam, shape, decay(near, shape), decay(root_near, shape))
+        for count in dict.fromkeys(shape.frames for shape in shapes if shape.frames > 1 and not shape.held):
+            end = seam.edge + seam.step * count
+            beyond = end + seam.step * np.arange(NEAR)
+            beyond = beyond[(beyond >= 0) & (beyond < plain.frames)]
+            target = np.broadcast_to(rotations[end], (NEAR, *rotations[end].shape))
+            path = bridge(
+                offset_vectors(turns, target[: len(turns)]),
+                offset_vectors(rotations[beyond], target[: len(beyond)]),
+                count,
+                order,
+            )
+            frames = seam.edge + seam.step * np.arange(1, count + 1)
+            there = turned(np.broadcast_to(rotations[end], (*path.shape[:2], 3, 3)), path)
+            along = root[end] + bridge(places - root[end], root[beyond] - root[end], count, order)
+            yield Transition(
+                seam, Shape(count, count, order=order), offset_vectors(there, rotations[frames]), along - root[frames]
+            )
 
 
 def _shapes(seam: Seam, fps: float, length: float | None, least: float) -> Iterator[Shape]:
@@ -97,12 +130,12 @@ def _shapes(seam: Seam, fps: float, length: float | None, least: float) -> Itera
         for settle in sorted({min(max(1, round(value * fps)), count) for value in SETTLE}):
             yield Shape(count, settle)
     if seam.free and seam.room < round(max(seconds) * fps):
-        for settle in sorted({min(max(1, round(value * fps)), seam.room) for value in SETTLE}):
-            yield Shape(seam.room, settle, held=True)
+        for value in SETTLE:
+            yield Shape(seam.room, max(1, round(value * fps)), held=True)
 
 
-def _cost(plain: Motion, clip: Motion, first: int, found: Transition, limits: Limits) -> float:
-    """Largest ratio of jerk and speed of the hands to their limits, in the transition and the frames around it."""
+def _ratios(plain: Motion, clip: Motion, first: int, found: Transition, limits: Limits) -> list[float]:
+    """Jerk and speed of the hands and turns of joints over their limits, in the transition and the frames around it."""
     seam = found.seam
     reach = seam.edge + seam.step * (len(found.root) + NEAR)
     low, high = sorted((seam.edge - seam.step * (NEAR - 1), reach))
@@ -114,7 +147,8 @@ def _cost(plain: Motion, clip: Motion, first: int, found: Transition, limits: Li
         rotations[frame - low] = clip.rotations[frame - first]
     part = replace(plain, rotations=rotations.astype(np.float32), root=np.zeros((high - low, 3), np.float32))
     places = local_places(part)
-    return max(
+    return [
         float(hand_jerk(places, part.skeleton, part.fps).max(initial=0.0)) / limits.jerk,
         float(hand_speeds(places, part.skeleton, part.fps).max(initial=0.0)) / limits.speed,
-    )
+        float(rotation_angle(rotations[1:], rotations[:-1]).max(initial=0.0)) * part.fps / limits.turn,
+    ]
