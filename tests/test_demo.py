@@ -9,7 +9,6 @@ from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.generator import Generator
-from a2g_jax.geometry.skeleton import BODY_JOINTS
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.metrics.rhythm import agreement_with_null, wrist_speed
@@ -54,11 +53,11 @@ def test_the_shipped_model_listens():
 def test_hands_rise_on_request_and_not_without_one(tmp_path, capsys):
     speech, run = talk(9.0, 5).audio, demo_run()
     generator = Generator(run)
-    body = (BODY_JOINTS.index("L_Wrist"), BODY_JOINTS.index("R_Wrist"))
 
     def height(motion):
+        wrists = [motion.skeleton.names.index(name) for name in ("L_Wrist", "R_Wrist")]
         places = motion.positions()
-        return float(np.mean(places[:, body, 1] - places[:, :1, 1]))
+        return float(np.mean(places[:, wrists, 1] - places[:, :1, 1]))
 
     def heights(*lines):
         controls = control_rows(run, lines, generator.frames(speech))

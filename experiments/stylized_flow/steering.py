@@ -4,7 +4,7 @@
     python -m experiments.stylized_flow.steering RUN --corpus CORPUS [--speeches 6] [--samples 2]
 
 Each control is set to the 10th, 50th and 90th percentile of the training clips, the others to their medians, for the
-same test speeches and seeds. Measured: mean height, speed and radius of the generated hands, compared with the request.
+same test speeches and seeds (:mod:`experiments.controls` measures the shipped runs in more detail). Measured: mean height, speed and radius of the generated hands, compared with the request.
 Writes ``results/steering.json`` and a picture.
 """
 
@@ -45,7 +45,7 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
     for name in names:
         rows = []
         for percentile in PERCENTILES:
-            curves = (f"{name}={percentile:g}",)
+            curves = (f"{name}={percentile / 100:g}",)
             made = replace(run, config=run.config.with_sampling(controls=curves))
             styles = styles_of(made, corpus, features, samples, seed)
             column = config.style_controls.index(name)

@@ -300,8 +300,10 @@ def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | N
     sampling = {
         _OLD_NAMES.get(name, name): value
         for name, value in values.pop("sampling").items()
-        if name not in ("keep_shared", "keep_specific")
+        if name not in ("keep_shared", "keep_specific", "control_gains")
     }
+    if "style_controls" not in values["model_config"]:
+        sampling.pop("control_curves", None)
     values["model_config"] |= sampling
     values |= {"corpus": name_of(corpus), "generation": dict(generation or {}), "package": None}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
