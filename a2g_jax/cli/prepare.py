@@ -101,8 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generated.add_argument(
         "--view",
         choices=("body", "beat", "ted", "ted-expressive", "s2g"),
-        help="show the speakers as a data set does: joints, bone directions or keypoints (default: beat with --features"
-        " emotion-gesture, else body)",
+        help="show the speakers as a data set does: joints, bone directions or keypoints (default: body)",
     )
     generated.add_argument(
         "--on-demand",
@@ -149,9 +148,7 @@ def _generated(options: argparse.Namespace) -> "Corpus":
     from a2g_jax.data.on_demand import OnDemand
     from a2g_jax.data.prepare import prepare_talker, view_poses
 
-    # A paper on the upper body has its generated corpus in the same form.
-    upper = _features(options).joints == "upper-body" and not options.fingers
-    view = options.view or ("beat" if upper else "body")
+    view = options.view or "body"
     if options.pose and options.pose not in view_poses(view):
         raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
     return prepare_talker(

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
 
     from a2g_jax.geometry.mirror import mirror
     from a2g_jax.geometry.motion import resample
-    from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_skeleton
+    from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_rig
     from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh, write_like
 
     source_path = Path(options.source)
@@ -54,8 +54,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     source = find_rig(motion, name=str(source_path))
     layout = None
     if options.to in _OWN:
-        own = body_skeleton if options.to == "body" else upper_body_skeleton
-        target = find_rig(own(source), name=options.to)
+        target = find_rig(body_skeleton(source), name="body") if options.to == "body" else upper_body_rig(source)
     else:
         example, layout = read_with_layout(Path(options.to))
         target = find_rig(example, name=options.to)

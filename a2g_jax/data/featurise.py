@@ -12,7 +12,7 @@ from a2g_jax.features.mel import log_mel
 from a2g_jax.geometry.motion import Motion, resample
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack, represent, resample_track
-from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_skeleton
+from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_rig
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.recording import PoseRecording, Recording
 
@@ -107,7 +107,7 @@ def choose_joints(motion: Motion, joints: str, where: str) -> Motion:
         rig = find_rig(motion, name=where)
     except InputError as error:
         raise InputError(f"{error} Or use --joints all, which keeps the rig as it is.") from None
-    target = body_skeleton(rig) if joints == "body" else upper_body_skeleton(rig)
+    target = body_skeleton(rig) if joints == "body" else upper_body_rig(rig)
     return retarget(motion, target, source=rig)
 
 

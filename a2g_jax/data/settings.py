@@ -60,10 +60,7 @@ PRESETS: dict[str, Features] = {
     # EmotionGesture: 47 joints in 6D at 15 frames a second; 128 bands, two spectra to a frame. Its hop of 512 samples
     # gives 124 spectra for 60 frames; these 120 stay in step with the motion.
     "emotion-gesture": Features(
-        fps=15.0,
-        mel=MelConfig(bands=128, window=1024, stack=2, range_db=_PUBLISHED_RANGE),
-        joints="upper-body",
-        waveform=True,
+        fps=15.0, mel=MelConfig(bands=128, window=1024, stack=2, range_db=_PUBLISHED_RANGE), joints="upper-body"
     ),
     # The same on TED: 43 joints, here as directions of 42 bones, since points do not determine rotations.
     "emotion-gesture-ted": Features(
@@ -71,7 +68,6 @@ PRESETS: dict[str, Features] = {
         mel=MelConfig(bands=128, window=1024, stack=2, range_db=_PUBLISHED_RANGE),
         pose="directions",
         joints="all",
-        waveform=True,
     ),
 }
 

@@ -124,8 +124,8 @@ def scores(
     counts = confusion(logits, labels)
     hits = np.argmax(logits, axis=-1) == labels
     groups = np.unique(recordings)
-    by_recording = [(int(hits[recordings == one].sum()), int((recordings == one).sum())) for one in groups]
-    interval = bootstrap_ratio(*(np.array(part) for part in zip(*by_recording, strict=True)), rng)
+    own_hits = np.array([hits[recordings == one].sum() for one in groups])
+    interval = bootstrap_ratio(own_hits, np.array([np.sum(recordings == one) for one in groups]), rng)
     true, predicted = counts.sum(axis=1), counts.sum(axis=0)
     recall = [float(counts[k, k] / true[k]) if true[k] else None for k in range(classes)]
     return {

@@ -51,18 +51,8 @@ def test_flags(tmp_path, short, capsys):
 
 def test_the_corpus_of_emotion_gesture_with_and_without_jitter(tmp_path, short):
     """The same speech, words, emotions and splits; only poses differ, so the clean corpus scores runs of the other."""
-    command = [
-        "prepare",
-        "talker",
-        "--features",
-        "emotion-gesture",
-        "--minutes",
-        "0.3",
-        "--seed",
-        "5",
-        "--workers",
-        "1",
-    ]
+    command = ["prepare", "talker", "--view", "beat", "--features", "emotion-gesture", "--waveform"]
+    command += ["--minutes", "0.3", "--seed", "5", "--workers", "1"]
     assert main([*command, "--out", str(tmp_path / "clean")]) == 0
     assert main([*command, "--jitter", "1", "--out", str(tmp_path / "noisy")]) == 0
     clean, noisy = (Corpus.open(tmp_path / name) for name in ("clean", "noisy"))

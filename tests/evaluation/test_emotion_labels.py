@@ -90,7 +90,7 @@ def test_a_window_is_classified_as_in_a_corpus(classifier, recordings):
         first = round(label.start * 15)
         audio = jnp.asarray(config.statistics["audio"].normalise(rows[first : first + 20])[None])
         batch = Batch(audio, jnp.zeros((1, 20, 22, 6)))
-        logits = config.build().classifier.logits(loaded.run.params, batch)
+        logits = config.build().classifier.logits(jax.tree.map(jnp.asarray, loaded.run.params), batch)
         expected = np.asarray(jax.nn.softmax(logits))[0]
         assert label.emotion == loaded.emotions[int(expected.argmax())]
         assert label.confidence == pytest.approx(float(expected.max()), abs=1e-5)

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from a2g_jax.errors import InputError
 from a2g_jax.recording import PoseRecording, Recording, Word
 
-AnyRecording = TypeVar("AnyRecording", Recording, PoseRecording)
+AnyRecording = TypeVar("AnyRecording", bound=Recording | PoseRecording)
 
 
 def cut(recording: AnyRecording, start: float, end: float | None = None) -> AnyRecording:
@@ -34,7 +34,8 @@ def cut(recording: AnyRecording, start: float, end: float | None = None) -> AnyR
         if word.end > start and word.start < stop
     )
     annotations = {name: _shifted(value, start, stop) for name, value in recording.annotations.items()}
-    return replace(recording, motion=moved, audio=audio, words=words, annotations=annotations)
+    changes: dict[str, Any] = {"motion": moved, "audio": audio, "words": words, "annotations": annotations}
+    return replace(recording, **changes)
 
 
 def _shifted(value: Any, start: float, stop: float) -> Any:

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.retarget.poses import joint_places
-from a2g_jax.geometry.retarget.rig import Rig
+from a2g_jax.geometry.retarget.rig import Rig, find_rig
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 
 #: Default positions of parts that a rig lacks: the collar as a share of the way from chest to shoulder, the ball of the
@@ -101,6 +101,20 @@ def upper_body_skeleton(rig: Rig) -> Skeleton:
             ends.append((names.index(name), tip))
     factor = rig.unit_factor
     return Skeleton((offsets * factor).astype(np.float32), names, parents, _scaled(sorted(ends), factor))
+
+
+def upper_body_rig(rig: Rig) -> Rig:
+    """:func:`upper_body_skeleton` as a target of retargeting.
+
+    Its last joint, ``Neck1``, moves as the second neck joint of a rig that has two, as in BEAT, where the head does not
+    turn against it; otherwise as the head.
+
+    Raises:
+        InputError: as of :func:`upper_body_skeleton`.
+    """
+    skeleton = upper_body_skeleton(rig)
+    nods = len(rig.neck) < 2 and "Head" in rig.roles
+    return find_rig(skeleton, name="the upper body", joints={"Head": "Neck1"} if nods else None)
 
 
 class _Person:

@@ -301,7 +301,17 @@ def test_real_take(shared, tmp_path):
     assert (take.name, take.split) == ("2_scott_0_1_1", "test")
     recording = beat.read(take, 16000)
     # The task of EmotionGesture: 47 joints at 15 frames a second, words at their start frames.
-    command = ["prepare", "beat", str(tmp_path), "--features", "emotion-gesture", "--workers", "1", "--labelled"]
+    command = [
+        "prepare",
+        "beat",
+        str(tmp_path),
+        "--features",
+        "emotion-gesture",
+        "--workers",
+        "1",
+        "--labelled",
+        "--waveform",
+    ]
     assert main([*command, "--out", str(tmp_path / "corpus")]) == 2
     assert main([*command, "--random-split", "--out", str(tmp_path / "corpus")]) == 0
     corpus = Corpus.open(tmp_path / "corpus")

@@ -25,7 +25,7 @@ def test_clips_with_a_table(tmp_path, capsys):
     labels = [WindowLabel(name, 2.0 * n, 2.0 * n + 4.0, "fear", 0.95) for name in names[:5] for n in range(3)]
     labels += [WindowLabel(names[5], 2.0, 6.0, "surprise", 0.92), WindowLabel(names[5], 4.0, 8.0, "contempt", 0.99)]
     labels += [WindowLabel(names[6], 0.0, 4.0, "anger", 0.89)]
-    command = ["prepare", "ted-emotion", str(ted), "--features", "emotion-gesture-ted", "--workers", "1"]
+    command = ["prepare", "ted-emotion", str(ted), "--features", "emotion-gesture-ted", "--workers", "1", "--waveform"]
     assert main([*command, "--out", str(tmp_path / "none")]) == 2
     assert "emotions.csv: there is no such table of emotions; make it with 'a2g label'" in capsys.readouterr().err
     write_table(ted / "emotions.csv", labels)
