@@ -286,12 +286,23 @@ class TestObjective:
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["generator"]))
         random = np.random.default_rng(8)
         way = jax.tree.map(lambda leaf: random.normal(size=leaf.shape), params["vae"])
+        # Measured once, and constants from then on.
+        way["features"] = jax.tree.map(np.zeros_like, params["vae"]["features"])
+        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["vae"]["features"]))
         ahead, behind = (
             function(params | {"vae": jax.tree.map(lambda p, w, s=sign: p + s * 1e-7 * w, params["vae"], way)})[0]
             for sign in (1, -1)
         )
         inner = sum(jax.tree.leaves(jax.tree.map(lambda g, w: np.sum(np.asarray(g) * w), gradient["vae"], way)))
         np.testing.assert_allclose(inner, (ahead - behind) / 2e-7, rtol=1e-4)
+
+    def test_the_vae_begins_with_the_scale_of_the_features(self):
+        model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()
+        params = make_params(model)
+        features = networks.encode_audio(params, batch.audio).emotion
+        measured = model.stages[1].warm_start(params, batch)["vae"]["features"]
+        np.testing.assert_allclose(measured["mean"], jnp.mean(features, axis=(0, 1)), rtol=1e-5)
+        np.testing.assert_allclose(measured["scale"], jnp.std(features, axis=(0, 1)), rtol=0.1, atol=1e-3)
 
 
 class TestSettings:

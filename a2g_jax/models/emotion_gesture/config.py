@@ -100,7 +100,7 @@ class EmotionGestureConfig:
     vae_channels: int = 40
     vae_steps: int = 30_000
     """Training steps of the emotion-conditioned VAE, after all others; 0 leaves it out."""
-    vae_kl_weight: float = 0.01
+    vae_kl_weight: float = 0.003
     """Weight of its KL divergence against the relative squared error."""
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optax
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
@@ -20,11 +21,14 @@ from a2g_jax.models.emotion_gesture.sampling import AUDIO, LABEL, EmotionGesture
 from a2g_jax.models.emotion_gesture.word_table import fill_table
 from a2g_jax.models.emotion_timeline import check_emotions, emotion_rows, parse_timeline
 from a2g_jax.models.optimiser import make_optimiser
+from a2g_jax.models.train_config import TrainConfig
 
 #: The emotion of the audio.
 _DEFAULT = EmotionGestureSampling()
 #: Adam's decay of the first moment (beta 1 of the authors' code).
 _MOMENTUM = 0.5
+#: Learning rate of the emotion-conditioned VAE.
+_VAE_RATE = 2e-3
 
 
 def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSampling = _DEFAULT) -> Model:
@@ -107,7 +111,9 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         updates = [Update(game, ("discriminator",), "discriminator", optimiser), *updates]
     stages = [Stage(tuple(updates), validation_loss=held_out)]
     if networks.samples_emotions:
-        stages.append(Stage((Update(vae_loss(networks), ("vae",)),), "emotion_vae", config.vae_steps))
+        update = Update(vae_loss(networks), ("vae",), optimiser=_vae_optimiser)
+        measure = lambda params, batch: networks.measure_features(params, batch.audio)  # noqa: E731
+        stages.append(Stage((update,), "emotion_vae", config.vae_steps, warm_start=measure))
     reads = config.mines and config.beat_weight > 0
     return Model(
         "emotion_gesture",
@@ -130,6 +136,11 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         overlap=config.stride - 1,
         reconstruct=reconstruct,
     )
+
+
+def _vae_optimiser(settings: TrainConfig) -> optax.GradientTransformation:
+    """Adam at a rate of its own, which falls to a hundredth: the VAE is small, and its loss no game."""
+    return optax.adam(optax.cosine_decay_schedule(_VAE_RATE, settings.steps, alpha=0.01))
 
 
 def _check_sampling(networks: Networks, sampling: EmotionGestureSampling) -> None:

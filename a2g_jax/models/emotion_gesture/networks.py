@@ -15,6 +15,8 @@ from a2g_jax.models.emotion_gesture.prompter import PosePrompter
 from a2g_jax.models.emotion_gesture.vae import FeatureDecoder, FeatureEncoder
 from a2g_jax.nn.transformer import Encoder
 
+#: Added to standard deviations of emotion features, before division.
+_LEAST = 1e-3
 #: Source of dropout: None for none.
 DropoutKey = Key[Array, ""] | None
 
@@ -101,6 +103,7 @@ class Networks:
             params["vae"] = {
                 "encoder": self._vae_encoder.init(jax.random.fold_in(key, 101), rows, label)["params"],
                 "decoder": self._vae_decoder.init(jax.random.fold_in(key, 102), latent, label)["params"],
+                "features": {"mean": jnp.zeros(c.channels), "scale": jnp.ones(c.channels)},
             }
         return params
 
@@ -158,15 +161,25 @@ class Networks:
         self, params: Params, features: Float[Array, "B N D"], label: Float[Array, "B E"]
     ) -> tuple[Float[Array, "B Z"], Float[Array, "B Z"]]:
         """Mean and log-variance of the VAE's latents."""
-        found: Any = self._vae_encoder.apply({"params": params["vae"]["encoder"]}, features, label)
+        own = jax.lax.stop_gradient(params["vae"]["features"])
+        scores = (features - own["mean"][None, None]) / own["scale"][None, None]
+        found: Any = self._vae_encoder.apply({"params": params["vae"]["encoder"]}, scores, label)
         return found
 
     def decode_emotion(
         self, params: Params, latent: Float[Array, "B Z"], label: Float[Array, "B E"]
     ) -> Float[Array, "B N D"]:
         """Emotion features of latents."""
-        features: Any = self._vae_decoder.apply({"params": params["vae"]["decoder"]}, latent, label)
-        return features
+        own = jax.lax.stop_gradient(params["vae"]["features"])
+        scores: Any = self._vae_decoder.apply({"params": params["vae"]["decoder"]}, latent, label)
+        return scores * own["scale"][None, None] + own["mean"][None, None]
+
+    def measure_features(self, params: Params, audio: Float[Array, "B N bands"]) -> Params:
+        """The parameters with mean and standard deviation of the emotion features of clips, for the VAE."""
+        features = self.encode_audio(params, audio).emotion
+        assert features is not None
+        measured = {"mean": jnp.mean(features, axis=(0, 1)), "scale": jnp.std(features, axis=(0, 1)) + _LEAST}
+        return params | {"vae": params["vae"] | {"features": measured}}
 
     def _apply(self, params: Params, name: str, key: DropoutKey, *inputs: Array) -> Any:
         module, own = self._generator[name], {"params": params["generator"][name]}

@@ -106,7 +106,8 @@ def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
         assert features is not None
         mean, log_variance = networks.encode_emotion(params, features, label)
         made = networks.decode_emotion(params, vae.draw(key, mean, log_variance), label)
-        terms = {"vae_error": vae.relative_error(features, made), "vae_kl": vae.divergence(mean, log_variance)}
+        scale = frozen["vae"]["features"]["scale"]
+        terms = {"vae_error": vae.relative_error(features, made, scale), "vae_kl": vae.divergence(mean, log_variance)}
         return terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"], terms
 
     return loss

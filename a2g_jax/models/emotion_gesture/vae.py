@@ -14,8 +14,6 @@ from a2g_jax.nn.strided import StridedConv1D
 _RATE = 4
 #: Bound of log-variances, so that no exponential overflows.
 _WIDEST = 8.0
-#: Added to the features' variance before division.
-_EPSILON = 1e-6
 
 
 class FeatureEncoder(nn.Module):
@@ -68,7 +66,8 @@ def divergence(mean: Float[Array, "B Z"], log_variance: Float[Array, "B Z"]) -> 
     return jnp.mean(0.5 * jnp.sum(jnp.exp(log_variance) + mean**2 - 1.0 - log_variance, axis=-1))
 
 
-def relative_error(target: Float[Array, "B N D"], made: Float[Array, "B N D"]) -> Float[Array, ""]:
-    """Squared error of features relative to their variance over the batch: 1 for a prediction of the mean."""
-    spread = jnp.mean(jnp.square(target - jnp.mean(target, axis=(0, 1), keepdims=True)))
-    return jnp.mean(jnp.square(target - made)) / (spread + _EPSILON)
+def relative_error(
+    target: Float[Array, "B N D"], made: Float[Array, "B N D"], scale: Float[Array, " D"]
+) -> Float[Array, ""]:
+    """Squared error of features in units of their standard deviation ``scale``: about 1 for their mean."""
+    return jnp.mean(jnp.square((target - made) / scale[None, None]))
