@@ -6,7 +6,7 @@ from typing import Any
 
 _COLUMNS = ("samples", "at_once", "eased", "drawn_again", "reported", "outside", "unreported")
 #: Most lines of refusals and reports that are listed.
-_MOST = 40
+_MOST = 25
 
 
 def render(found: Mapping[str, Any]) -> str:
@@ -22,7 +22,7 @@ def render(found: Mapping[str, Any]) -> str:
         " what is still outside is drawn again, then reported. A second implementation of the bounds judged the files:"
         f" **{sum(row['unreported'] for row in done)} frames outside the bounds were not reported.**",
         "",
-        "| run | generations | refused calls | motions | good at once | eased back | drawn again | reported"
+        "| run | options | refused calls | motions | good at once | eased back | drawn again | reported"
         " | frames outside | not reported |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
@@ -30,6 +30,7 @@ def render(found: Mapping[str, Any]) -> str:
         for group in dict.fromkeys(row["group"] for row in rows):
             lines.append(_row(run, group, [row for row in rows if (row["run"], row["group"]) == (run, group)]))
     lines.append(_row("all", "", rows))
+    lines += ["", "Samples that were drawn again are also among those that are good after easing, or reported."]
     lines += ["", "Figures outside the bounds in first draws (findings):", ""]
     for run in found["runs"]:
         before: Counter[str] = Counter()
