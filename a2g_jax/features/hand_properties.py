@@ -63,4 +63,5 @@ def _smooth(hands: Hands, deviation: float) -> Float[Array, "T 2 3"]:
     reach = max(1, round(3.0 * deviation))
     window = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / deviation))
     around = jnp.pad(jnp.asarray(hands), ((reach, reach), (0, 0), (0, 0)), mode="edge")
-    return sum(float(weight) * around[first : first + len(hands)] for first, weight in enumerate(window / window.sum()))
+    shifted = jnp.stack([around[first : first + len(hands)] for first in range(len(window))], axis=-1)
+    return shifted @ jnp.asarray(window / window.sum(), shifted.dtype)

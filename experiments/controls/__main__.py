@@ -11,8 +11,9 @@ speeches and keys. JUDGE is a classifier of emotions in motion that was trained 
     a2g train emotion_classifier --input motion --corpus other --out judge --clip-frames 240 --steps 2000
         --batch-size 16 --dropout 0.5
 
-Writes ``controls.json``, ``controls.md`` and ``controls.png`` into ``--out``. With ``--store``, the response without
-gains is measured first, and its inverse is written to the run as the sampling setting ``control_gains``.
+Writes ``controls.json``, ``controls.md`` and ``controls.png`` into ``--out``, beside the figures of other runs that are
+there. With ``--store``, the response without gains is measured first, and its inverse is written to the run as the
+sampling setting ``control_gains``.
 """
 
 import argparse
@@ -61,34 +62,32 @@ def main() -> None:
     if options.store:
         opened = {name: _stored(name, run, speeches, options) for name, run in opened.items()}
     judge = None if options.judge is None else load_emotion_judge(options.judge, Corpus.open(options.judge_corpus))
-    figures: dict[str, Any] = {
-        "about": {
-            "command": " ".join(["python -m experiments.controls", *map(_named, options.runs), *_given(options)]),
+    place = options.out / "controls.json"
+    figures: dict[str, Any] = read_json(place) if place.is_file() else {"runs": {}}
+    options.out.mkdir(parents=True, exist_ok=True)
+    for name, run in opened.items():
+        talk.refuse_trained(name, run)
+        subject = Subject(run, speeches, options.draws, options.seed)
+        emotions = run.config.data().emotions if judge is not None and _has_emotion(run) else ()
+        if judge is not None and emotions:
+            figures |= {"emotions": list(emotions), "true_emotions": true_confusion(judge, emotions)}
+        total = 1 + len(subject.names) * (len(QUANTILES) + 1) + len(emotions)
+        with progress_bar(total, f"measuring {_named(name)}", "request") as bar:
+            found = responses(subject, _spread(run, speeches), lambda: bar.update(1))
+            if judge is not None and emotions:
+                found["emotions"] = confusion(subject, judge, emotions, lambda: bar.update(1))
+        found["about"] = {
+            "command": " ".join(["python -m experiments.controls", _named(name), *_given(options)]),
             "speeches": len(speeches),
             "talk_seed": SEED,
             "seconds": SECONDS,
             "draws": options.draws,
             "seed": options.seed,
-            "judge": None if judge is None else judge.fingerprint,
-        },
-        "runs": {},
-    }
-    for name, run in opened.items():
-        talk.refuse_trained(name, run)
-        subject = Subject(run, speeches, options.draws, options.seed)
-        emotions = run.config.data().emotions if judge is not None and _has_emotion(run) else ()
-        total = 1 + len(subject.names) * (len(QUANTILES) + 1) + len(emotions)
-        with progress_bar(total, f"measuring {_named(name)}", "request") as bar:
-            found = responses(subject, _spread(run, speeches), lambda: bar.update(1))
-            found["gains"] = list(run.config.sampling_settings.control_gains)
-            if judge is not None and emotions:
-                found["emotions"] = confusion(subject, judge, emotions, lambda: bar.update(1))
-                figures["emotions"] = list(emotions)
+            "gains": list(run.config.sampling_settings.control_gains),
+            "judge": judge.fingerprint if judge is not None and emotions else None,
+        }
         figures["runs"][_named(name)] = found
-    if judge is not None and "emotions" in figures:
-        figures["true_emotions"] = true_confusion(judge, figures["emotions"])
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_json(options.out / "controls.json", figures)
+        write_json(place, figures)
     (options.out / "controls.md").write_text(render(figures), encoding="utf-8")
     draw(figures, options.out / "controls.png")
     sys.stdout.write((options.out / "controls.md").read_text(encoding="utf-8"))

@@ -37,7 +37,7 @@ def true_confusion(judge: EmotionJudge, emotions: Sequence[str]) -> dict[str, An
             [
                 judge.shares(represent(take.motion, kind, take.name)[0], emotions)
                 for who, speaker in enumerate(SPEAKERS)
-                for take in [talk(SECONDS, SEED + who, speaker, emotion, fps=fps)]
+                for take in [talk(SECONDS, SEED + who, speaker=speaker, emotion=emotion, fps=fps)]
             ]
             for emotion in emotions
         ]

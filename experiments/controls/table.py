@@ -8,17 +8,26 @@ from a2g_jax.features.hand_properties import PROPERTIES
 
 def render(figures: dict[str, Any]) -> str:
     """The page of results."""
-    about = figures["about"]
     lines = [
         "# Response to named controls",
         "",
-        f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
-        f" {about['seconds']:g} s, {about['draws']} motions each with keys of their own. Intervals are the 95 %"
-        " bootstrap over speeches.",
+        "Intervals are the 95 % bootstrap over speeches.",
         "",
     ]
     for name, run in figures["runs"].items():
-        lines += [f"## {name}", "", *_slopes(run), "", *_side_effects(run), ""]
+        about = run["about"]
+        lines += [
+            f"## {name}",
+            "",
+            f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
+            f" {about['seconds']:g} s, {about['draws']} motions each with keys of their own; gains"
+            f" {', '.join(about['gains']) or 'none'}.",
+            "",
+            *_slopes(run),
+            "",
+            *_side_effects(run),
+            "",
+        ]
     if "true_emotions" in figures:
         lines += ["## Emotions", "", *_emotions(figures)]
     return "\n".join(lines).rstrip() + "\n"

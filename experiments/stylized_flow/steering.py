@@ -4,9 +4,9 @@
     python -m experiments.stylized_flow.steering RUN --corpus CORPUS [--speeches 6] [--samples 2]
 
 Each control is set to the 10th, 50th and 90th percentile of the training clips, the others to their medians, for the
-same test speeches and seeds (:mod:`experiments.controls` measures the shipped runs in more detail). Measured: mean
-height, speed and radius of the generated hands, compared with the request. Writes ``results/steering.json`` and a
-picture.
+same test speeches and seeds. Measured: mean height, speed and radius of the generated hands, compared with the request.
+:mod:`experiments.controls` measures the shipped runs in more detail.
+Writes ``results/steering.json`` and a picture.
 """
 
 import argparse
