@@ -203,7 +203,7 @@ def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
         seed_clip=_clip("--seed-clip", options.seed_clip, None),
         **_given(values),
     )
-    styled = styling.place(run, options.samples)
+    styled = styling.place(run)
 
     def report(out: Path) -> list[str]:
         write_json(out / "style.json", styled.to_json())

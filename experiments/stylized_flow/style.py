@@ -110,11 +110,9 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
         conditions = {"plain": plain, "the clip itself": [clip.motion]}
         for mode, share, seeded in SETTINGS:
             style = replace(whole, mode=mode, share=share)
-            # A clip repeated with share 1 is deterministic.
-            count = 1 if (mode, share) == ("repeat", 1.0) else samples
             before = clip.motion if seeded else None
             name = f"{mode}, share {share:g}" + (", after the clip" if seeded else "")
-            conditions[name] = space.generate(speech.audio, count, number, style, before)
+            conditions[name] = space.generate(speech.audio, samples, number, style, before)
         for name, motions in conditions.items():
             audio = clip.audio if name == "the clip itself" else speech.audio
             found = [agreement_with_null(one, audio, 16000) for one in motions]

@@ -261,8 +261,10 @@ def test_from_the_command_line(files, tmp_path, capsys, monkeypatch):
         (["--style", "clip.bvh", "--style-audio", "nowhere.wav"], "nowhere.wav"),
         (["--style", "blink.bvh"], "--style blink.bvh: lasts 0.07 s; give a clip of 1 s or more."),
         (["--seed-clip", "blink.bvh"], "--seed-clip blink.bvh: has 2 frames at the run's 30 fps; give a clip of 3"),
-        (["--style", "clip.bvh", "--style-share", "1"], "--style-share 1: draws nothing"),
-        (["--style", "clip.bvh", "--style-audio", "speech.wav", "--pin", "clip.bvh@1"], "--pin is for runs of audio"),
+        (
+            ["--style", "clip.bvh", "--pin", "clip.bvh@0", "--pin-mode", "latent"],
+            "--pin-mode latent is for runs of audio",
+        ),
     ],
 )
 def test_bad_usage_from_the_command_line(files, tmp_path, capsys, monkeypatch, flags, message):

@@ -29,6 +29,9 @@ Rows = Float[np.ndarray, "T R D"]
 Earlier = Float[np.ndarray, "S R D"]
 LogMel = Float[np.ndarray, "F bands"]
 
+#: Largest :attr:`~a2g_jax.generation.stylized_flow.style.Style.trust` in a clip's latents: the code and the controls hold
+#: more of a style, and with all of the latents hands are up to twice as fast as the clip's where the speech is another.
+_MOST_TRUST = 0.7
 #: Seconds of a speech, and the seed of the samples, that the requests of a style are found on.
 _MATCHED, _MATCHED_SEED = 30.0, 20_220_701
 
@@ -65,6 +68,7 @@ class FlowSpace:
         measure = model.controls.measure if model.controls else None
         measure = measure or (lambda pose: jnp.zeros((*pose.shape[:2], 0)))
         self._controls = jax.jit(measure)
+        self._density = None if model.density is None else jax.jit(model.density.log_likelihood)
         self._code = None if model.style_code is None else jax.jit(model.style_code)
         self._clip_frames = model.clip_frames
         self._names = model.controls.names if model.controls else ()
@@ -118,6 +122,21 @@ class FlowSpace:
         Raises:
             InputError: no frames, too few poses before them, or another number of audio rows.
         """
+        audio, poses, controls, code = self._padded(rows, features, before)
+        return np.asarray(self._encode(self._params, audio, poses, controls, code))[: len(rows)]
+
+    def log_likelihood(self, rows: Rows, features: LogMel | None = None) -> Float[np.ndarray, " T"]:
+        """Log-density of poses in nats, frame by frame, given the speech and the poses before; the first pose is held
+        before the clip.
+
+        Arguments and errors of :meth:`encode_rows`.
+        """
+        assert self._density is not None
+        audio, poses, _, _ = self._padded(rows, features, None)
+        return np.asarray(self._density(self._params, audio[None], poses[None]))[0, : len(rows)]
+
+    def _padded(self, rows: Rows, features: LogMel | None, before: Earlier | None) -> tuple[Any, Any, Any, Any]:
+        """Audio, poses and controls of a clip and the frames around it, and its style code."""
         frames = len(rows)
         if features is None:
             features = np.full((frames, self.run.config.mel.width), self._silence(), np.float32)
@@ -132,8 +151,7 @@ class FlowSpace:
         # Style controls are averages over seconds: of the clip only, not of the padding around it.
         controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0]
         controls = np.pad(controls, ((self.history, after), (0, 0)), mode="edge")
-        code = self._style_code(rows)
-        return np.asarray(self._encode(self._params, audio, np.asarray(poses, np.float32), controls, code))[:frames]
+        return audio, np.asarray(poses, np.float32), controls, self._style_code(rows)
 
     def _style_code(self, rows: Rows) -> Float[np.ndarray, " S"] | None:
         """Mean style code of parts of a clip that are as long as those of training; None without such codes."""
@@ -189,7 +207,7 @@ class FlowSpace:
             controls = self._mean_controls(places)
         measured = replace(clip, code=float(np.median(sizes)), adapted=replace(clip.adapted, latents=factor))
         # The more the latents had to shrink, the less they hold of the clip's style.
-        trust = float(np.sqrt(min(factor, 1.0)))
+        trust = min(_MOST_TRUST, float(np.sqrt(factor)))
         return Style(latents, mode, share, self._style_code(rows), controls, trust), measured
 
     def generate(

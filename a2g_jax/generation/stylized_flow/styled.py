@@ -75,18 +75,13 @@ class Styling:
         silent = [clip for clip in (self.style, self.second) if clip is not None and clip.audio is None]
         return tuple(f"{clip.path}: encoded with silence; give its speech with {clip.flag}-audio" for clip in silent)
 
-    def place(self, run: Run, samples: int) -> "Styled":
+    def place(self, run: Run) -> "Styled":
         """The clips, encoded with a run.
 
         Raises:
-            InputError: a run of another model, a clip that cannot be used, or samples that would all be the same.
+            InputError: a run of another model, or a clip that cannot be used.
         """
         space = FlowSpace(run)
-        if self.style is not None and self.share == 1.0 and self.mode == "repeat" and samples > 1:
-            raise InputError(
-                "--style-share 1: draws nothing, so that all samples would be equal; use --samples 1, a smaller share,"
-                " or --style-mode statistics."
-            )
         style = seed = target = None
         clips: dict[str, Fitted] = {}
         if self.style is not None:
