@@ -55,7 +55,8 @@ def stroke_rate(hands: Hands, fps: float) -> Float[Array, ""]:
     # The first of equal neighbours, so that a plateau is one peak.
     before = jnp.concatenate([jnp.full(1, -jnp.inf), speed[:-1]])
     fast = speed >= jnp.maximum(LEAST, SHARE * jnp.percentile(speed, 95.0))
-    return jnp.sum((speed == highest) & (speed > before) & fast) / (len(speed) / fps)
+    peaks = jnp.asarray((speed == highest) & (speed > before) & fast)
+    return jnp.sum(peaks) / (len(speed) / fps)
 
 
 def _smooth(hands: Hands, deviation: float) -> Float[Array, "T 2 3"]:
