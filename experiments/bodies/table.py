@@ -28,7 +28,8 @@ def render(found: Mapping[str, Any]) -> str:
     ]
     for run in found["runs"]:
         for group in dict.fromkeys(row["group"] for row in rows):
-            lines.append(_row(run, group, [row for row in rows if (row["run"], row["group"]) == (run, group)]))
+            if own := [row for row in rows if (row["run"], row["group"]) == (run, group)]:
+                lines.append(_row(run, group, own))
     lines.append(_row("all", "", rows))
     lines += ["", "Samples that were drawn again are also among those that are good after easing, or reported."]
     lines += ["", "Figures outside the bounds in first draws (findings):", ""]
