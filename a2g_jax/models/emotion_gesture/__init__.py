@@ -11,4 +11,5 @@ ENTRY = Entry(
     sampling=EmotionGestureSampling,
     sampling_presets=SAMPLING_PRESETS,
     training=TRAINING_PRESETS,
+    needs_emotions=True,
 )
