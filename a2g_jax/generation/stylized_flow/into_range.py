@@ -8,6 +8,7 @@ movements, is in the deviations from the clip's own posture.
 
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -79,9 +80,9 @@ def rows_into_range(
     """:func:`into_range` of poses; channels that do not move in training have their mean."""
     statistics, space = run.config.statistics["pose"], run.config.space
     mean, std = (np.asarray(part, np.float64).reshape(-1) for part in (statistics.mean, statistics.std))
-    flat = space.continuous(rows, statistics.mean).reshape(len(rows), -1)
+    flat = space.continuous(rows, np.asarray(statistics.mean)).reshape(len(rows), -1)
     at = ranges.channels
     moved = into_range((flat[:, at] - mean[at]) / std[at], ranges)
     result = np.tile(mean, (len(rows), 1))
     result[:, at] += moved.z * std[at]
-    return np.asarray(space.valid(result.reshape(rows.shape).astype(np.float32))), moved
+    return np.asarray(space.valid(jnp.asarray(result.reshape(rows.shape), jnp.float32))), moved
