@@ -90,6 +90,25 @@ def parse_flags(pairs: Sequence[str], *owners: Any, hint: str) -> tuple[Any, ...
     return tuple(dataclasses.replace(owner, **mine) for owner, mine in zip(owners, changes, strict=True))
 
 
+def check_needs(before: Any, after: Any, model: Mapping[str, Any]) -> None:
+    """Refuse changes of settings that have no effect on a model.
+
+    Args:
+        before: settings with the values that a run stores; ``after``: those that are requested. A field whose metadata
+            have ``needs``, the name of a setting of the model, has an effect only where that one is neither zero nor
+            empty.
+        model: settings of the model.
+
+    Raises:
+        InputError: such a setting is changed.
+    """
+    for field in fields(after):
+        needs = field.metadata.get("needs")
+        if needs and getattr(before, field.name) != getattr(after, field.name) and not model.get(needs):
+            flag = "--" + needs.replace("_", "-")
+            raise InputError(f"{flag_of(field)}: has no effect on this run, which was trained without {flag}.")
+
+
 def settings_lines(settings: Any) -> list[str]:
     """The flag, value and description of each setting, as ``--settings`` prints them."""
     about = _descriptions(type(settings))

@@ -1,7 +1,7 @@
 """Flags of ``a2g generate`` that name clips: pinned to the timeline, as a style, or as seed poses."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,8 +73,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_flags(options: argparse.Namespace) -> None:
+def check_flags(options: argparse.Namespace, settings: Sequence[str] = ()) -> None:
     """Refuse flags that belong to a flag that is not there, and pins together with styles.
+
+    Args:
+        settings: flags of sampling settings, such as ``["--style-gain", "1.2"]``.
 
     Raises:
         InputError: such a flag.
@@ -86,6 +89,8 @@ def check_flags(options: argparse.Namespace) -> None:
     if options.style is None:
         names = ("style_audio", "style_share", "style_mode", "style_with", "style_with_audio", "style_mix")
         _refuse(options, names, "--style; name a clip")
+        if of_styles := [flag.partition("=")[0] for flag in settings if flag.startswith("--style-")]:
+            raise InputError(f"{of_styles[0]} is for --style; name a clip.")
     if options.style_with is None:
         _refuse(options, ("style_with_audio", "style_mix"), "--style-with; name a second clip")
     if options.pin_mode == "latent" and (options.style is not None or options.seed_clip is not None):

@@ -47,7 +47,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     for name in ("audio", "out"):
         if getattr(options, name) is None:
             raise InputError(f"--{name} is needed (see 'a2g generate --help').")
-    clips.check_flags(options)
+    clips.check_flags(options, extra)
     existing_file(options.audio)
     clips.check_files(options)
 

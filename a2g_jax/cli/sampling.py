@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli.argument_types import count, formats, seed
-from a2g_jax.config import from_json, parse_flags
+from a2g_jax.config import check_needs, from_json, parse_flags
 from a2g_jax.generation.formats import PAGE, format_names
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
@@ -65,8 +65,10 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
     values = read_description(folder)
     entry = find_trained_model(str(values.get("model")), str(folder / RUN_FILE))
     about = folder / RUN_FILE
-    stored: Any = from_json(entry.sampling, split_settings(entry, values, about)[1], str(about))
+    model, sampling = split_settings(entry, values, about)
+    stored: Any = from_json(entry.sampling, sampling, str(about))
     (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
+    check_needs(stored, changed, model)
     return changed
 
 

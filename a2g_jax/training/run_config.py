@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Array, Float
 
+from a2g_jax.config import check_needs
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
@@ -163,7 +164,7 @@ class RunConfig:
         """The run with other sampling settings.
 
         Raises:
-            InputError: a setting that the model does not have, or a value out of range.
+            InputError: a setting that the model does not have or that has no effect on it, or a value out of range.
         """
         names = [field.name for field in fields(self.sampling_settings)]
         for name in changes:
@@ -171,7 +172,9 @@ class RunConfig:
                 raise InputError(
                     f"{self.model}: has no sampling setting {name!r}; it has: {', '.join(names) or 'none'}."
                 )
-        return replace(self, sampling=replace(self.sampling_settings, **changes))
+        changed = replace(self.sampling_settings, **changes)
+        check_needs(self.sampling_settings, changed, vars(self.model_config))
+        return replace(self, sampling=changed)
 
 
 @dataclass(frozen=True, eq=False)

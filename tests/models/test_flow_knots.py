@@ -202,6 +202,10 @@ def test_guidance_of_one_and_of_the_same_condition_change_nothing():
     guided = networks.audio_context(params, jnp.pad(audio, ((0, 6), (0, 0))), Extras(style=code), guided=True)
     stronger = proceed(networks, params, z, guided, start(networks, params, 1, how=how), jnp.int32(0), how)[0]
     assert np.abs(stronger - plain).max() > 1e-3
+    # Without a style there is nothing to guide, and motion is plain to the bit.
+    free, state = proceed(networks, params, z, given, start(networks, params, 1, how=how), jnp.int32(0), how)
+    np.testing.assert_array_equal(free, plain)
+    assert jax.tree.map(jnp.shape, state) == jax.tree.map(jnp.shape, start(networks, params, 1, how=how))
 
 
 @pytest.mark.slow

@@ -29,8 +29,8 @@ Rows = Float[np.ndarray, "T R D"]
 Earlier = Float[np.ndarray, "S R D"]
 LogMel = Float[np.ndarray, "F bands"]
 
-#: Largest :attr:`~a2g_jax.generation.stylized_flow.style.Style.trust` in a clip's latents: the code and the controls hold
-#: more of a style, and with all of the latents hands are up to twice as fast as the clip's where the speech is another.
+#: Largest :attr:`~a2g_jax.generation.stylized_flow.style.Style.trust` in a clip: its code and controls hold more of
+#: a style, and with all of the latents hands are up to twice as fast as the clip's where the speech is another.
 _MOST_TRUST = 0.7
 #: Seconds of a speech, and the seed of the samples, that the requests of a style are found on.
 _MATCHED, _MATCHED_SEED = 30.0, 20_220_701

@@ -15,8 +15,8 @@ from a2g_jax.metrics.style import HandStyle, hand_style
 
 #: Differences from the clip that people do not mind: metres, m/s, metres. They are also the units of the way.
 NEAR = HandStyle(0.05, 0.1, 0.05)
-#: Shares of the way from which a style counts as followed, and as followed in part.
-FOLLOWED, PARTLY = 0.5, 0.25
+#: Shares of the way between which a style counts as followed in part.
+PARTLY = (0.5, 1.5)
 #: Factor on the higher one of the clip's own and the plain motion's top speed, from which styled motion is rough.
 ROUGH = 1.5
 
@@ -46,13 +46,12 @@ class StyleTarget:
         return float(aim @ went / max(float(aim @ aim), 1e-9))
 
     def verdict(self, made: HandStyle) -> str:
-        """Followed: all three of the hands' properties are near the clip's, or half of the way was gone. In part: a
-        quarter of it."""
-        near = np.abs(np.array(made) - np.array(self.clip)) <= np.array(NEAR)
-        way = self.way(made)
-        if near.all() or way >= FOLLOWED:
+        """Followed: height, speed and radius are all near the clip's. In part: two of them are, or motion went at least
+        half of the way, and no more than half as far again."""
+        near = int(np.sum(np.abs(np.array(made) - np.array(self.clip)) <= np.array(NEAR)))
+        if near == len(made):
             return Verdict.FOLLOWED
-        return Verdict.PARTLY if way >= PARTLY else Verdict.NOT
+        return Verdict.PARTLY if near == 2 or PARTLY[0] <= self.way(made) <= PARTLY[1] else Verdict.NOT
 
 
 @dataclass(frozen=True)

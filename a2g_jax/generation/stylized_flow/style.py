@@ -81,8 +81,8 @@ def within_training(
     """Latents of a clip, no larger than those of training clips, and with the order of the clip's own.
 
     The mean over time keeps its direction, and its norm is at most the 99th percentile of the training clips'.
-    Deviations from it keep their order: those of a channel are scaled to a standard deviation of at most 1.3, values are
-    clipped to 1.5, and the whole is scaled to a mean square of at most 1, the variance of draws.
+    Deviations from it keep their order: those of a channel are scaled to a standard deviation of at most 1.3, values
+    are clipped to 1.5, and the whole is scaled to a mean square of at most 1, the variance of draws.
 
     Args:
         clip_means: mean latents of training clips; None leaves the clip's mean as it is.
