@@ -278,16 +278,3 @@ def test_options_place_pins(run, speech, take, tmp_path):
     assert placed.pins[0].motion.frames == 30
     list(placed.stream(speech.audio, 1))
     assert (placed.reports[0][0]["before"], placed.reports[0][0]["after"]) == (0.5, 0.5)
-
-
-def test_hands_that_shake_at_an_end_are_left_out(run, take):
-    clip = take.clip(100, 160)
-    rotations = np.array(clip.rotations)
-    elbow = TALKER_SKELETON.names.index("R_Elbow")
-    rotations[56, elbow] = rotations[56, elbow] @ Rotation.from_euler("y", 25, degrees=True).as_matrix()
-    pin, sound = (pin_of(one, run, "clip", 1.0) for one in (replace(clip, rotations=rotations), clip))
-    assert 50 <= pin.motion.frames < 57
-    assert "its hands shake in its last 0." in pin.notes[0]
-    assert (sound.motion.frames, sound.notes) == (60, ())
-    backwards = pin_of(replace(clip, rotations=rotations[::-1]), run, "clip", 1.0)
-    assert backwards.start == pytest.approx(1.0 + (60 - pin.motion.frames) / 30.0)

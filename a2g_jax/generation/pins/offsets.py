@@ -30,8 +30,8 @@ class Shape:
     held: bool = False
     """The offset stays instead of decaying, towards an end of the motion."""
     order: int = 2
-    """Highest derivative that is continuous at the clip's end: 2 the acceleration, 1 a mean velocity; in a recording
-    that shakes there, acceleration is noise."""
+    """Highest derivative that is continuous at the clip's end: 2 the acceleration, 1 a mean velocity, 0 neither; in
+    a recording that shakes there, acceleration and velocity are noise."""
 
 
 def offset_vectors(

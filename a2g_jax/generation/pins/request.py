@@ -10,7 +10,6 @@ import numpy as np
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clip_fit import Bounds, ClipFit, animal_joints, leading_t_pose, measure_clip, refusals
 from a2g_jax.generation.clips import read_motion
-from a2g_jax.generation.pins.ends import SHAKY, sound_ends
 from a2g_jax.generation.pins.repair import repair_flips
 from a2g_jax.generation.pins.smooth import resample_smoothly
 from a2g_jax.geometry.motion import Motion
@@ -21,6 +20,8 @@ from a2g_jax.training.run import Run
 _FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 #: Metres of a root's path from which its loss is reported.
 _TRAVEL = 0.3
+#: Jerk of hands that shake, m/s3: twice that of the liveliest talk.
+_SHAKY = 2500.0
 
 
 class Pin(NamedTuple):
@@ -121,11 +122,6 @@ def pin_of(
     motion, repairs = repair_flips(motion)
     notes += repairs
     motion = resample_smoothly(motion, config.fps, max(frames, 1))
-    first, stop = sound_ends(motion)
-    for frames, place in ((first, "first"), (motion.frames - stop, "last")):
-        if frames:
-            notes.append(f"its hands shake in its {place} {frames / config.fps:.2f} s, which are left out")
-    start, motion = start + first / config.fps, motion.clip(first, stop)
     facing = np.asarray(config.space.mean_rotations(config.statistics["pose"].mean)[0], np.float64)
     motion, turned = face(motion, facing)
     fit = measure_clip(motion, config.space, config.statistics["pose"])
@@ -136,7 +132,7 @@ def pin_of(
         raise InputError(f"{text}: {' It also '.join(reasons)}")
     if fit.travel > _TRAVEL:
         notes.append(f"its path of {fit.travel:.1f} m along the floor is not kept: the body stays where it stands")
-    if fit.jerk_p99 > SHAKY:
+    if fit.jerk_p99 > _SHAKY:
         notes.append(f"its own hands shake (99th percentile of jerk {fit.jerk_p99:.0f} m/s3): filter it at the source")
     return Pin(name, start, motion, turned, tuple(notes), fit)
 

@@ -97,7 +97,7 @@ def _candidates(
     turns, places = np.asarray(clip.rotations, np.float64)[inside - first], np.asarray(clip.root)[inside - first]
     near, root_near = offset_vectors(turns, rotations[inside]), places - root[inside]
     shapes = list(_shapes(seam, plain.fps, length, least))
-    for order in (2, 1):
+    for order in (2, 1, 0):
         for one in shapes:
             shape = replace(one, order=order)
             yield Transition(seam, shape, decay(near, shape), decay(root_near, shape))
