@@ -42,6 +42,9 @@ def draw(figures: dict[str, Any], path: Path) -> None:
 
 def _responses(axis: Axes, name: str, runs: dict[str, Any]) -> None:
     having = {run: found["controls"][name] for run, found in runs.items() if name in found["controls"]}
+    if not having:
+        axis.set_axis_off()
+        return
     ends = [value for found in having.values() for value in found["requested"]]
     axis.plot([min(ends), max(ends)], [min(ends), max(ends)], color="0.7", linestyle="--", label="as requested")
     for colour, (run, found) in zip(_COLOURS, having.items(), strict=False):

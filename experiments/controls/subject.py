@@ -81,6 +81,7 @@ class Subject:
     draws: int
     """Motions for each speech, with keys of their own."""
     seed: int
+    """Of the first speech; the next one has the next."""
 
     @cached_property
     def ruler(self) -> Ruler:
@@ -110,10 +111,13 @@ class Subject:
         return [speech_features(self.run, speech.audio[: round(SECONDS * SAMPLE_RATE)]) for speech in self.speeches]
 
     def rows(self, lines: Sequence[str]) -> Iterator[tuple[Speech, Rows]]:
-        """Every motion with the requested controls, speech by speech; without a request for no lines."""
-        for speech, features in zip(self.speeches, self._features, strict=True):
+        """Every motion with the requested controls, speech by speech; without a request for no lines.
+
+        Each speech has a seed of its own: with one seed, speeches get the same stored codes at the same second.
+        """
+        for number, (speech, features) in enumerate(zip(self.speeches, self._features, strict=True)):
             given = {"controls": control_rows(self.run, lines, len(features))} if lines else {}
-            for rows in self._generator.rows(features, self.draws, self.seed, **given):
+            for rows in self._generator.rows(features, self.draws, self.seed + number, **given):
                 yield speech, rows
 
     def measure(self, lines: Sequence[str]) -> list[Figures]:

@@ -20,7 +20,7 @@ def render(figures: dict[str, Any]) -> str:
             f"## {name}",
             "",
             f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
-            f" {about['seconds']:g} s, {about['draws']} motions each with keys of their own; gains"
+            f" {about['seconds']:g} s, {about['draws']} motions each, seeds from {about['seed']} on; gains"
             f" {', '.join(about['gains']) or 'none'}.",
             "",
             *_slopes(run),

@@ -1,5 +1,7 @@
 """The latent space as notebooks use it, on the shipped weights."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,8 +22,12 @@ def speech():
     return talk(6.0, 11)
 
 
-def test_codes_decode_to_what_generation_gives(space, speech):
-    generated = Generator(demo_run()).generate(speech.audio, 2, seed=5)[1]
+@pytest.mark.parametrize("controls", [(), ("height=0.1@0,0.9@5", "emotion=anger")])
+def test_codes_decode_to_what_generation_gives(speech, controls):
+    run = demo_run()
+    run = replace(run, config=run.config.with_sampling(controls=controls))
+    space = LatentSpace(run)
+    generated = Generator(run).generate(speech.audio, 2, seed=5)[1]
     motion = space.to_motion(space.from_audio(speech.audio, seed=5, sample=1))
     assert motion.frames == generated.frames
     np.testing.assert_allclose(motion.rotations, generated.rotations, atol=2e-4)
