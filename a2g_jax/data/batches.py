@@ -117,13 +117,18 @@ class BatchMaker:
         return {"mirrored": chosen, **poses}
 
 
-def tiled_starts(corpus: Corpus, split: str, frames: int) -> Int[np.ndarray, " clips"]:
+def tiled_starts(corpus: Corpus, split: str, frames: int, offset: int = 0) -> Int[np.ndarray, " clips"]:
     """First rows of the clips that tile a split without overlap; a stretch's remainder is left out.
 
     A split whose stretches are all shorter than a clip gives none.
+
+    Args:
+        offset: of the first clip from the beginning of its stretch.
     """
     starts = [
-        start for segment in corpus.segments(split) for start in range(segment.start, segment.stop - frames + 1, frames)
+        start
+        for segment in corpus.segments(split)
+        for start in range(segment.start + offset, segment.stop - frames + 1, frames)
     ]
     return np.array(starts, np.int32)
 

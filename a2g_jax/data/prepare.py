@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from a2g_jax.data.body_json import skeleton_to_json
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
 from a2g_jax.data.datasets import Take, find_data_set
@@ -18,6 +19,7 @@ from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_space import interchangeable
+from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.progress import progress_bar, say
 from a2g_jax.talker.views.catalogue import find_view
 
@@ -76,6 +78,7 @@ def prepare_data_set(
     skip_broken: bool = False,
     limit: int | None = None,
     workers: int | None = None,
+    skeleton: Skeleton | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
@@ -87,6 +90,7 @@ def prepare_data_set(
         skip_broken: leave out recordings that cannot be prepared, and note them in the manifest.
         limit: largest number of recordings, spread evenly over all.
         workers: number of processes; one for every core if None.
+        skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
@@ -101,9 +105,11 @@ def prepare_data_set(
             f"{folder}: all {len(takes)} recordings are for validation and testing in the official split, none for"
             " training; add training recordings, or split by the seed with --random-split."
         )
-    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken)
+    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken, skeleton=skeleton)
     items = [Item(take.name, take.sources) for take in takes]
-    recipe = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}
+    recipe: dict[str, Any] = {"reader": name, "source": os.fspath(source), "seed": seed, "limit": limit}
+    if skeleton is not None:
+        recipe["body"] = skeleton_to_json(skeleton)
     plan = Plan(features, recipe, seed, official=official, skip_broken=skip_broken)
     return prepare_corpus(out, items, partial(_make, "preparing", read, takes, workers), plan, say)
 
@@ -130,12 +136,14 @@ def _make(
             bar.update()
 
 
-def _read_rows(take: Take, name: str, features: Features, skip_broken: bool) -> Prepared | Skipped:
+def _read_rows(
+    take: Take, name: str, features: Features, skip_broken: bool, skeleton: Skeleton | None
+) -> Prepared | Skipped:
     try:
         recording = find_data_set(name).read(take, features.mel.sample_rate)
         # In a corpus a recording has the name and the files of its take.
         recording = replace(recording, name=take.name, sources=take.sources)
-        return prepare_recording(recording, features, take.split)
+        return prepare_recording(recording, features, take.split, skeleton)
     except InputError as error:
         if not skip_broken:
             raise

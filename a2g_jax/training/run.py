@@ -22,6 +22,7 @@ from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual as Perceptual
 from a2g_jax.training.run_config import Run as Run
 from a2g_jax.training.run_config import RunConfig as RunConfig
+from a2g_jax.training.run_config import Source as Source
 from a2g_jax.training.run_file import (
     FORMAT,
     RUN_FILE,
@@ -68,6 +69,7 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         **body_to_json(config.space.body),
         "corpus": config.corpus,
         "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
+        **({} if config.source is None else {"from": asdict(config.source)}),
     }
 
 
@@ -108,6 +110,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             statistics=statistics,
             corpus=values["corpus"],
             perceptual=Perceptual(values["feature_network"]) if values.get("feature_network") else None,
+            source=from_json(Source, values["from"], str(about)) if values.get("from") else None,
         )
         steps = int(values["steps"])
     except InputError:

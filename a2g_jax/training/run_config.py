@@ -29,6 +29,25 @@ class Perceptual:
     training needs them."""
 
 
+@dataclass(frozen=True)
+class Source:
+    """The run that a training started from, and what was kept of it."""
+
+    run: str
+    """Its name or folder."""
+    steps: int
+    """Its training steps."""
+    weights: str
+    """SHA-256 of its weights."""
+    corpus: str
+    """Fingerprint of its corpus."""
+    stages: tuple[str, ...] = ()
+    """See :class:`a2g_jax.models.fine_tuning.FineTuning`, as for the other fields."""
+    pose_statistics: str = "corpus"
+    audio_statistics: str = "corpus"
+    keep_constant: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class RunConfig:
     """The description of a run: everything but its weights."""
@@ -49,6 +68,8 @@ class RunConfig:
     """The feature network of a perceptual loss."""
     sampling: Any = None
     """Sampling settings; None for those of the preset."""
+    source: Source | None = None
+    """The run that training started from; None for initial weights."""
 
     @property
     def entry(self) -> Entry:

@@ -1,8 +1,26 @@
 """Stylized flow (ECCV 2022) and its baseline MoGlow: an autoregressive normalising flow of poses."""
 
+from dataclasses import replace
+
 from a2g_jax.models.entry import Entry
+from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.stylized_flow.config import PRESETS, TRAINING_PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.sampling import SAMPLING_PRESETS, StylizedFlowSampling
+
+#: Constant channels have no density, and the others keep theirs.
+_FINE_TUNING = FineTuning(
+    replace(
+        TRAINING_PRESETS["tiny"],
+        steps=300,
+        learning_rate=3e-4,
+        warmup_steps=20,
+        checkpoint_every=50,
+        validate_every=50,
+        patience=3,
+    ),
+    audio_statistics="run",
+    keep_constant=True,
+)
 
 ENTRY = Entry(
     config=StylizedFlowConfig,
@@ -11,4 +29,5 @@ ENTRY = Entry(
     sampling=StylizedFlowSampling,
     sampling_presets=SAMPLING_PRESETS,
     training=TRAINING_PRESETS,
+    fine_tuning=_FINE_TUNING,
 )
