@@ -1,6 +1,7 @@
 """``a2g prepare --for`` and ``a2g train --from``: any rig at any rate, and what is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def takes(tmp_path_factory):
     for name, speaker, fps, scale in (("one", "ada", 30.0, 1.0), ("two", "bruno", 60.0, 1.2)):
         take = talk(8.0, 3, speaker=speaker)
         motion = resample(take.motion, fps)
-        write_bvh(folder / f"{name}.bvh", motion._replace(skeleton=motion.skeleton.scaled(scale)))
+        write_bvh(folder / f"{name}.bvh", replace(motion, skeleton=motion.skeleton.scaled(scale)))
         write_audio(folder / f"{name}.wav", take.audio, take.sample_rate)
     return folder
 

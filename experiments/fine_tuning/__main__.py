@@ -4,9 +4,9 @@
     python -m experiments.fine_tuning --run demo-flow        # the flow
     python -m experiments.fine_tuning --only fine-tuned      # one method; the others are taken from the records
 
-The takes are the BVH files with a WAV file beside them in ``A2G_SHARED_DATA``. Every take, method and seed is a record in
-``results/RUN/``, kept as soon as it is measured, so the command is resumable; trainings are resumed where they stopped.
-Weights trained on research-only recordings stay in ``--cache``.
+The takes are the BVH files with a WAV file beside them in ``A2G_SHARED_DATA``. Every take, method and seed is a record
+in ``results/RUN/``, kept as soon as it is measured, so the command is resumable; trainings are resumed where they
+stopped. Weights trained on research-only recordings stay in ``--cache``.
 """
 
 import argparse

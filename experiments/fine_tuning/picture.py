@@ -1,4 +1,4 @@
-"""The picture of the guide: every statistic relative to the person's; and film strips, which are not for publication."""
+"""The picture of the guide: every statistic relative to the person's; and film strips, not for publication."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -38,8 +38,8 @@ def render(run: str, records: Sequence[dict[str, Any]], samples: int, cores: int
         "- **distance**: mean over the statistics before agreement of the absolute binary logarithm of the ratio to the"
         " person's (1 is a factor of two); of rest and height the difference by 20 (per cent of time, cm), of posture"
         " by 10 cm. The range is over seeds.",
-        f"- Minutes are of processor time, one process on {cores} shared cores. No FGD: the held-out end has three clips"
-        " of the feature network.",
+        f"- Minutes are of processor time, one process on {cores} shared cores. No FGD: the held-out end has three"
+        " clips of the feature network.",
     ]
     return "\n".join(lines) + "\n"
 
