@@ -30,6 +30,8 @@ class FineTuning:
     """Settings of the model in place of the run's, such as weights of losses; flags change them."""
     stages: tuple[str, ...] = ()
     """Names of the stages of training that are run; all of them if empty. A single one takes ``--steps`` steps."""
+    frozen: tuple[str, ...] = ()
+    """Networks that are not trained, those of them that a run has; ``--frozen`` names further ones."""
     pose_statistics: str = "corpus"
     """``corpus``: poses are z-scores of the new recordings, so that the networks' outputs have the new person's posture
     and amplitude from the first step; ``run``: z-scores of the run's corpus."""

@@ -16,7 +16,6 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
 from a2g_jax.models.base import Model
-from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual, Run, RunConfig, Source
 from a2g_jax.training.run_file import WEIGHTS_FILE, run_folder
@@ -52,6 +51,7 @@ def start_from(name: str | os.PathLike[str], run: Run) -> Start:
             weights=sha256_file(run_folder(name) / WEIGHTS_FILE),
             corpus=str(run.config.corpus.get("fingerprint")),
             stages=tuning.stages,
+            frozen=tuning.frozen,
             pose_statistics=tuning.pose_statistics,
             audio_statistics=tuning.audio_statistics,
             keep_constant=tuning.keep_constant,
@@ -164,13 +164,15 @@ def training_model(config: RunConfig) -> Model:
 
 
 def tuned_model(model: Model, source: Source) -> Model:
-    """The model with the stages of a fine-tuning; nothing is initialised from data."""
+    """The model with the stages and the trained networks of a fine-tuning; nothing is initialised from data."""
     stages = [stage for stage in model.stages if not source.stages or stage.name in source.stages] or model.stages
-    return model._replace(
+    tuned = model._replace(
         stages=tuple(
             stage._replace(warm_start=None, steps=None if len(stages) == 1 else stage.steps) for stage in stages
         )
     )
+    networks = jax.eval_shape(model.init, jax.random.key(0)) if source.frozen else {}
+    return without_frozen(tuned, tuple(name for name in source.frozen if name in networks))
 
 
 def without_frozen(model: Model, frozen: tuple[str, ...]) -> Model:
@@ -223,12 +225,3 @@ def with_validation(corpus: Corpus, frames: int) -> tuple[Corpus, str]:
         f"the validation split is shorter than a clip; the last {seconds:.0f} s of training are held out in its place"
     )
     return replace(corpus, splits={**corpus.splits, "train": train, "validation": validation}), line
-
-
-def describe(tuning: FineTuning) -> str:
-    """A line about what a fine-tuning trains, for ``--settings``."""
-    stages = f"the stage {', '.join(tuning.stages)}" if tuning.stages else "all stages"
-    return (
-        f"fine-tuning: {stages}; z-scores of poses by the {tuning.pose_statistics}'s statistics, of audio by the"
-        f" {tuning.audio_statistics}'s"
-    )

@@ -43,6 +43,7 @@ class Source:
     """Fingerprint of its corpus."""
     stages: tuple[str, ...] = ()
     """See :class:`a2g_jax.models.fine_tuning.FineTuning`, as for the other fields."""
+    frozen: tuple[str, ...] = ()
     pose_statistics: str = "corpus"
     audio_statistics: str = "corpus"
     keep_constant: bool = False

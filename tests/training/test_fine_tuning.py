@@ -172,6 +172,14 @@ def test_frozen_networks_do_not_move(tmp_path, tuned, toy_corpus):
         without_frozen(model, NETWORKS)
 
 
+def test_networks_that_a_model_keeps_in_fine_tuning_stay(tuned):
+    config, _ = tuned(steps=1)
+    assert config.source is not None
+    source = dataclasses.replace(config.source, frozen=("audio_encoder", "a_network_of_other_presets"))
+    (stage,) = training_model(dataclasses.replace(config, source=source)).stages
+    assert stage.updates[0].trains == tuple(name for name in NETWORKS if name != "audio_encoder")
+
+
 def test_stages_and_initialisation_of_the_source():
     entry = find_model("audio2gestures")
     assert entry.fine_tuning.stages == ("adversarial",)
