@@ -9,7 +9,7 @@ import pytest
 from a2g_jax.cli import main
 from a2g_jax.generation import comparison
 from a2g_jax.generation.generator import Generator
-from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.talker.demo_speech import demo_recording
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.loop import train
@@ -27,23 +27,23 @@ def page_data(folder):
 @pytest.mark.slow
 def test_compare_shows_every_system_and_the_talker(tmp_path):
     out = tmp_path / "comparison"
-    assert main(["demo", "--compare", "--samples", "1", "--seed", "3", "--formats", "bvh,html", "--out", str(out)]) == 0
+    assert main(["demo", "--compare", "--samples", "1", "--seed", "3", "--formats", "npz,html", "--out", str(out)]) == 0
     data = page_data(out)
     assert [figure["label"] for figure in data["figures"]] == ["talker", *SHIPPED]
     assert data["words"]
     assert data["figures"][0]["tracks"]
     recording, _ = demo_recording()
-    truth = read_bvh(out / "talker_00.bvh")
+    truth = read_motion_npz(out / "talker_00.npz")
     assert np.abs(truth.positions() - recording.motion.positions()).max() < 1e-3
     # A system moves as it does alone.
     alone = Generator(open_run("demo")).generate(recording.audio, 1, seed=3)[0]
-    assert np.abs(read_bvh(out / "demo_00.bvh").positions() - alone.positions()).max() < 1e-3
+    assert np.abs(read_motion_npz(out / "demo_00.npz").positions() - alone.positions()).max() < 1e-3
     # One's own speech has no talker, and the talker of the other speech is gone.
     files = {path.name for path in out.iterdir()}
-    assert files == {"index.html", "talker_00.bvh", *(f"{name}_00.bvh" for name in SHIPPED)}
+    assert files == {"index.html", "talker_00.npz", *(f"{name}_00.npz" for name in SHIPPED)}
     own = comparison.Speech("speech.wav", lambda _: talk(2.0, 5).audio)
-    comparison.compare(comparison.systems(), own, out, samples=1, seed=0, formats=("bvh", "html"))
-    assert "talker_00.bvh" not in {path.name for path in out.iterdir()}
+    comparison.compare(comparison.systems(), own, out, samples=1, seed=0, formats=("npz", "html"))
+    assert "talker_00.npz" not in {path.name for path in out.iterdir()}
     assert [figure["label"] for figure in page_data(out)["figures"]] == list(SHIPPED)
     assert "no true talker" in (out / "index.html").read_text(encoding="utf-8")
 

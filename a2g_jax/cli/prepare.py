@@ -6,7 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from a2g_jax.cli.argument_types import count, frame_rate, natural, positive, seed, share
-from a2g_jax.cli.paths import existing_file, existing_folder
+from a2g_jax.cli.paths import existing_file, existing_folder, existing_run
 from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_kinds import WIDTHS
@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from a2g_jax.data.corpus import Corpus
     from a2g_jax.data.generated import TalkerOptions
     from a2g_jax.data.settings import Features
+    from a2g_jax.geometry.skeleton import Skeleton
 
 DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: the same command resumes."
 #: The generated corpus, and the data sets of this package.
 READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
 _GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
-_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled")
+_RECORDED = ("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled", "for_run")
+#: Flags that a run decides with ``--for``.
+_OF_RUN = ("features", "fps", "pose", "joints")
 
 
 def reader_name(text: str) -> str:
@@ -71,6 +74,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--joints",
         choices=("body", "upper-body", "all"),
         help="body: any rig on 22 joints; upper-body: on 47 with fingers; all: the rig as it is (default: body)",
+    )
+    recorded.add_argument(
+        "--for",
+        dest="for_run",
+        metavar="RUN",
+        help="rate, mel bands, poses and body of a run, for 'a2g train --from RUN': a run folder, demo or demo-flow",
     )
     recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
     recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")
@@ -194,9 +203,11 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
     from a2g_jax.data.datasets import find_data_set
     from a2g_jax.data.prepare import prepare_data_set
 
-    reader = find_data_set(options.reader)
+    reader, skeleton = find_data_set(options.reader), None
     features = _features(options)
-    if options.features is None:
+    if options.for_run is not None:
+        features, skeleton = _of_run(options)
+    elif options.features is None:
         features = dataclasses.replace(features, fps=options.fps or reader.fps, pose=options.pose or reader.pose)
     return prepare_data_set(
         options.reader,
@@ -211,7 +222,24 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         confidence=options.confidence,
         labelled=options.labelled,
         workers=options.workers,
+        skeleton=skeleton,
     )
+
+
+def _of_run(options: argparse.Namespace) -> "tuple[Features, Skeleton | None]":
+    """The features and the body of a run."""
+    existing_run(options.for_run)
+    for name in _OF_RUN:
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name}: is decided by --for {options.for_run}; leave one of them out.")
+
+    from a2g_jax.data.settings import Features
+    from a2g_jax.training.run import open_run
+
+    config = open_run(options.for_run).config
+    space = config.space
+    features = Features(config.fps, config.mel, space.kind, "all", options.waveform)
+    return features, space.skeleton if space.has_rotations else None
 
 
 def _features(options: argparse.Namespace) -> "Features":
@@ -226,7 +254,7 @@ def _features(options: argparse.Namespace) -> "Features":
 def _refuse(options: argparse.Namespace, names: tuple[str, ...], reason: str) -> None:
     for name in names:
         if getattr(options, name) not in (None, False):
-            raise InputError(f"--{name.replace('_', '-')} is for {reason}")
+            raise InputError(f"--{name.removesuffix('_run').replace('_', '-')} is for {reason}")
 
 
 def _names(flag: str, text: str | None) -> tuple[str, ...]:

@@ -1,16 +1,17 @@
 """``a2g train``: train a model on a corpus."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.cli.paths import existing_corpus, existing_features
+from a2g_jax.cli.paths import existing_corpus, existing_features, existing_run
 from a2g_jax.config import from_json, parse_flags, settings_lines
 from a2g_jax.errors import InputError
 from a2g_jax.models.entry import Entry
 from a2g_jax.models.registry import find_model, model_names
 from a2g_jax.models.train_config import TrainConfig
-from a2g_jax.training.run_file import RUN_FILE, read_description, split_settings
+from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
 
 DESCRIPTION = "Train a model on a corpus. Every setting of the model and the training is a flag too: see --settings."
 #: Further flags are settings.
@@ -26,9 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="RUN", help="folder of the run")
     parser.add_argument(
         "--preset",
-        default="tiny",
         help="tiny: minutes on 2 cores; paper: as published; for stylized_flow also ted, moglow and moglow_styled"
         " (default: tiny)",
+    )
+    parser.add_argument(
+        "--from",
+        dest="source",
+        metavar="RUN",
+        help="start from the weights of a run (a folder, or demo or demo-flow), with its settings, to adapt it to one"
+        " to ten minutes of a person's recordings; prepare these with 'a2g prepare ... --for RUN'",
     )
     parser.add_argument(
         "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"
@@ -51,18 +58,26 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
         InputError: an unknown model, setting or preset, or a corpus, run or feature network that cannot be used.
     """
     entry = find_model(options.model)
-    if options.preset not in entry.presets:
-        raise InputError(f"{options.model} has no preset {options.preset!r}; there are: {', '.join(entry.presets)}.")
+    if options.source is not None and options.preset is not None:
+        raise InputError(f"--preset: the settings are those of {options.source}; leave --preset or --from out.")
+    preset = options.preset or "tiny"
+    if preset not in entry.presets:
+        raise InputError(f"{options.model} has no preset {preset!r}; there are: {', '.join(entry.presets)}.")
+    existing_run(options.source)
     if not options.settings:
         for name in ("corpus", "out"):
             if getattr(options, name) is None:
                 raise InputError(f"--{name} is needed (see 'a2g train --help').")
         existing_corpus(options.corpus)
         existing_features(options.features)
-    preset, *published = options.preset, entry.presets[options.preset], entry.training_preset(options.preset)
+    published = [entry.presets[preset], entry.training_preset(preset)]
+    if options.source is not None:
+        preset, *published = _source(options.source, options.model, entry)
     stored = None if options.settings or not options.resume else _stored(Path(options.out), options.model, entry)
     if stored is not None:
-        preset, *published = stored
+        preset, *published, before = stored
+        options.source = options.source or before
+        existing_run(options.source)
     model, training = parse_flags(extra, *published, hint=f"'a2g train {options.model} --settings'")
     if options.settings:
         print("# settings of the model", *settings_lines(model), "", "# settings of the training", sep="\n")
@@ -76,7 +91,15 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
 
     keep_compilations()
     trained = run_training(
-        options.model, preset, model, training, options.corpus, options.out, options.resume, options.features
+        options.model,
+        preset,
+        model,
+        training,
+        options.corpus,
+        options.out,
+        options.resume,
+        options.features,
+        options.source,
     )
     # A run folder names its model, and code of other packages is imported only by permission.
     allowed = f"A2G_MODELS={options.model} " if ":" in options.model else ""
@@ -88,10 +111,23 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     print(f"{options.out}: trained for {trained.steps} steps; next: {following}")
 
 
-def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConfig] | None:
-    """Preset and settings of the run in a folder; None where there is no run of that model."""
+def _source(name: str, model: str, entry: Entry) -> tuple[str, Any, TrainConfig]:
+    """Preset and settings of the run to start from, and the settings of the model's fine-tuning."""
+    folder = run_folder(name)
+    about, values = folder / RUN_FILE, read_description(folder)
+    if values.get("model") != model:
+        raise InputError(f"{name}: is a run of {values.get('model')}; train that model, or start from one of {model}.")
+    settings: Any = from_json(entry.config, split_settings(entry, values, about)[0], str(about))
+    tuning = entry.fine_tuning
+    return str(values.get("preset")), replace(settings, **tuning.settings), tuning.training
+
+
+def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConfig, str | None] | None:
+    """Preset, settings and source of the run in a folder; None where there is no run of that model."""
     about = folder / RUN_FILE
     if not about.is_file() or (values := read_description(folder)).get("model") != model:
         return None
     settings: Any = from_json(entry.config, split_settings(entry, values, about)[0], str(about))
-    return str(values.get("preset")), settings, from_json(TrainConfig, values.get("train_config", {}), str(about))
+    training = from_json(TrainConfig, values.get("train_config", {}), str(about))
+    source = values.get("from")
+    return str(values.get("preset")), settings, training, source.get("run") if isinstance(source, dict) else None

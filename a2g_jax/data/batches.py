@@ -117,7 +117,9 @@ class BatchMaker:
         return {"mirrored": chosen, **poses}
 
 
-def tiled_starts(corpus: Corpus, split: str, frames: int, stride: int | None = None) -> Int[np.ndarray, " clips"]:
+def tiled_starts(
+    corpus: Corpus, split: str, frames: int, stride: int | None = None, offset: int = 0
+) -> Int[np.ndarray, " clips"]:
     """First rows of the clips that tile a split; a stretch's remainder is left out.
 
     A split whose stretches are all shorter than a clip gives none.
@@ -125,11 +127,12 @@ def tiled_starts(corpus: Corpus, split: str, frames: int, stride: int | None = N
     Args:
         frames: of a clip.
         stride: frames from one clip to the next; a whole clip, so that none overlap, if None.
+        offset: of the first clip from the beginning of its stretch.
     """
     starts = [
         start
         for segment in corpus.segments(split)
-        for start in range(segment.start, segment.stop - frames + 1, stride or frames)
+        for start in range(segment.start + offset, segment.stop - frames + 1, stride or frames)
     ]
     return np.array(starts, np.int32)
 

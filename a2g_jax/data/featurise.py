@@ -13,6 +13,7 @@ from a2g_jax.geometry.motion import Motion, resample
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_track import PoseTrack, represent, resample_track
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, retarget, upper_body_rig
+from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.recording import PoseRecording, Recording
 
@@ -46,11 +47,14 @@ class Skipped:
     reason: str
 
 
-def prepare_recording(recording: Recording | PoseRecording, features: Features, split: str = "") -> Prepared:
+def prepare_recording(
+    recording: Recording | PoseRecording, features: Features, split: str = "", skeleton: Skeleton | None = None
+) -> Prepared:
     """Features and motion of one recording, over the frames that both have.
 
     Args:
         split: the recording's part of the official split, if any.
+        skeleton: the body to retarget to, in place of the one that ``features.joints`` describes.
 
     Raises:
         InputError: audio and motion differ in length by more than a second and 5 %, the audio has another rate, the
@@ -74,7 +78,11 @@ def prepare_recording(recording: Recording | PoseRecording, features: Features, 
         motion = resample_track(recording.motion, fps, frames)
         root = np.zeros((frames, 3), np.float32)
     else:
-        motion = resample(choose_joints(recording.motion, features.joints, where), fps, frames)
+        if skeleton is None:
+            moved = choose_joints(recording.motion, features.joints, where)
+        else:
+            moved = on_skeleton(recording.motion, skeleton, recording.motion.fps, where)
+        motion = resample(moved, fps, frames)
         root = np.asarray(motion.root, np.float32)
     pose, body = represent(motion, features.pose, where)
     return Prepared(

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from a2g_jax.data.body_json import skeleton_to_json
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_writer import Item, Plan, prepare_corpus
 from a2g_jax.data.datasets import LabelRule, Take, find_data_set
@@ -20,6 +21,7 @@ from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_space import interchangeable
+from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
 from a2g_jax.progress import progress_bar, say
 from a2g_jax.recording import PoseRecording, Recording
@@ -85,6 +87,7 @@ def prepare_data_set(
     confidence: float | None = None,
     labelled: bool = False,
     workers: int | None = None,
+    skeleton: Skeleton | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
@@ -100,6 +103,7 @@ def prepare_data_set(
         confidence: least probability of a window's emotion in the table; of the data set, or 0.9, if None.
         labelled: leave out recordings without an emotion, and note them in the manifest.
         workers: number of processes; one for every core if None.
+        skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
@@ -118,7 +122,11 @@ def prepare_data_set(
         )
     if labelled:
         recipe["labelled"] = True
-    read = partial(_read_rows, name=name, features=features, skip_broken=skip_broken, labelled=labelled)
+    if skeleton is not None:
+        recipe["body"] = skeleton_to_json(skeleton)
+    read = partial(
+        _read_rows, name=name, features=features, skip_broken=skip_broken, labelled=labelled, skeleton=skeleton
+    )
     items = [Item(take.name, take.sources) for take in takes]
     groups = {take.name: take.group for take in takes if take.group}
     plan = Plan(features, recipe, seed, official=official, groups=groups, skip_broken=skip_broken)
@@ -201,12 +209,14 @@ def read_take(take: Take, name: str, sample_rate: int) -> Recording | PoseRecord
     return replace(cut(recording, piece.start, piece.end), emotion=piece.emotion, annotations=annotations)
 
 
-def _read_rows(take: Take, name: str, features: Features, skip_broken: bool, labelled: bool) -> Prepared | Skipped:
+def _read_rows(
+    take: Take, name: str, features: Features, skip_broken: bool, labelled: bool, skeleton: Skeleton | None
+) -> Prepared | Skipped:
     try:
         recording = read_take(take, name, features.mel.sample_rate)
         if labelled and not recording.emotion:
             return Skipped(take.name, take.sources, f"{take.sources[0]}: has no emotion label.")
-        return prepare_recording(recording, features, take.split)
+        return prepare_recording(recording, features, take.split, skeleton)
     except InputError as error:
         if not skip_broken:
             raise

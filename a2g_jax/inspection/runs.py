@@ -1,6 +1,5 @@
 """Inspection of a run made by ``a2g train``."""
 
-import json
 import os
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,8 @@ from flax.traverse_util import flatten_dict
 from a2g_jax.inspection.finding import Finding
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.tree import body_facts
+from a2g_jax.training.early_stopping import ended, read_metrics, validations
+from a2g_jax.training.fine_tuning import training_model
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import SHIPPED
 from a2g_jax.training.stages import span_at, stage_spans
@@ -31,16 +32,17 @@ def inspect_run(name: str | os.PathLike[str]) -> Report:
         InputError: not a run, or a damaged one.
     """
     run = open_run(name)
-    log = [] if str(name) in SHIPPED else _metrics(Path(name) / _METRICS)
+    log = [] if str(name) in SHIPPED else read_metrics(Path(name) / _METRICS)
     return Report(str(name), "run", run_facts(run, log), check_run(run, log))
 
 
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
     """Findings on unfinished training, losses that are not numbers, and rising validation loss."""
     findings = []
-    spans = stage_spans(run.config.build(), run.config.train_config)
+    settings = run.config.train_config
+    spans = stage_spans(training_model(run.config), settings)
     wanted, stage = spans[-1].stop, span_at(spans, max(run.steps - 1, 0))
-    if run.steps < wanted:
+    if run.steps < wanted and not ended(settings, validations(log, spans[-1].first, wanted)):
         message = f"{run.steps} of {wanted} steps are done."
         findings.append(
             Finding("info", "unfinished", message, "Continue with 'a2g train ... --resume'.", value=run.steps / wanted)
@@ -90,6 +92,7 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
                 if name in ("reader", "source", "seed", "minutes")
             },
         },
+        **({} if config.source is None else {"trained from": _plain(asdict(config.source))}),
         "model settings": _plain(asdict(config.model_config)),
         "sampling settings": _plain(asdict(config.sampling_settings)),
         "training settings": _plain(asdict(config.train_config)),
@@ -104,19 +107,3 @@ def run_facts(run: Run, log: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _plain(values: dict[str, Any]) -> dict[str, Any]:
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
-
-
-def _metrics(path: Path) -> list[dict[str, Any]]:
-    """Lines of the log, without a last line that was cut short."""
-    lines: list[dict[str, Any]] = []
-    if not path.is_file():
-        return lines
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for text in file:
-            try:
-                line = json.loads(text)
-            except ValueError:
-                continue
-            if isinstance(line, dict):
-                lines.append(line)
-    return lines

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
+from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.train_config import TRAIN_PRESETS, TrainConfig
 
 
@@ -36,6 +37,8 @@ class Entry:
     """Kinds of poses that the model takes (:data:`a2g_jax.geometry.pose_space.WIDTHS`); all if empty."""
     needs_emotions: bool = False
     """Whether every recording of the corpus needs an emotion."""
+    fine_tuning: FineTuning = field(default_factory=FineTuning)
+    """How training goes that starts from a run (``a2g train --from``)."""
 
     def builder(self) -> Callable[..., Any]:
         """The function that ``build`` names."""

@@ -42,6 +42,11 @@ class TrainConfig:
     """Corpora up to this size are kept on the device; larger ones are read from disk batch by batch."""
     part_steps: int = 500
     """Steps on one part of a corpus prepared with --on-demand before the next part; other corpora are one part."""
+    patience: int = 0
+    """Validations without a better loss after which the last stage ends; its weights of the best loss are kept. 0 to
+    train to the end and keep the last weights."""
+    frozen: tuple[str, ...] = ()
+    """Networks that are not trained, such as audio_encoder."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
 
@@ -58,7 +63,7 @@ class TrainConfig:
         for name in counts:
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
-        for name in ("warmup_steps", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
+        for name in ("warmup_steps", "patience", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
         if not 0 <= self.mirror <= 1:

@@ -24,8 +24,12 @@ class Checkpoints:
             return []
         return sorted(int(path.name) for path in self.folder.iterdir() if path.is_dir() and path.name.isdigit())
 
-    def save(self, state: TrainState) -> None:
-        """Save the state under its step, then remove all but the latest few."""
+    def save(self, state: TrainState, best: int | None = None) -> None:
+        """Save the state under its step, then remove all but the latest few and the best.
+
+        Args:
+            best: the step of the best checkpoint, if that is kept.
+        """
         step = int(state.step)
         path = self.folder / str(step)
         if path.exists():
@@ -33,13 +37,15 @@ class Checkpoints:
         self.folder.mkdir(parents=True, exist_ok=True)
         ocp.save(path, state._asdict())
         for old in self.steps()[: -self.keep]:
-            shutil.rmtree(self.folder / str(old))
+            if old != best:
+                shutil.rmtree(self.folder / str(old))
 
-    def restore(self, like: TrainState) -> TrainState | None:
+    def restore(self, like: TrainState, step: int | None = None) -> TrainState | None:
         """The latest state, or None if there is none.
 
         Args:
             like: a state of the run's shapes, such as that of step 0.
+            step: of another checkpoint.
 
         Raises:
             InputError: the checkpoint is damaged or of another model.
@@ -47,7 +53,7 @@ class Checkpoints:
         steps = self.steps()
         if not steps:
             return None
-        path = self.folder / str(steps[-1])
+        path = self.folder / str(steps[-1] if step is None else step)
         try:
             tree = _load(path, like)
         except InputError:

@@ -21,9 +21,12 @@ from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder, read_json, write_json
-from a2g_jax.models.base import Model
+from a2g_jax.models.base import Model, Params
+from a2g_jax.progress import say
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
+from a2g_jax.training.early_stopping import ended, read_metrics, validations
+from a2g_jax.training.fine_tuning import training_model, with_validation
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
 from a2g_jax.training.run_file import FORMAT, RUN_FILE, WEIGHTS_FILE
@@ -40,16 +43,26 @@ class TrainingError(A2GError):
 
 
 def train(
-    config: RunConfig, corpus: Corpus, out: str | os.PathLike[str], *, resume: bool, progress: bool = True
+    config: RunConfig,
+    corpus: Corpus,
+    out: str | os.PathLike[str],
+    *,
+    resume: bool,
+    progress: bool = True,
+    start: Params | None = None,
 ) -> Run:
     """Train a model on a corpus; the run folder can generate at any time after the first checkpoint.
 
     Interruptible and resumable: killed at any moment and resumed, it ends with the same parameters, bit for bit.
 
+    With ``--patience`` the last stage ends when its validation loss has not improved for that many validations, and
+    the run has the weights of the lowest loss.
+
     Args:
         out: the run folder. It must not hold a run, unless resuming.
         resume: continue from the latest checkpoint; starts again if there is none.
         progress: show a progress bar on standard error.
+        start: weights of the run that ``config.source`` names, for training that starts from it.
 
     Raises:
         InputError: the folder holds a run, or another run than the one to resume.
@@ -59,7 +72,11 @@ def train(
     out = Path(out)
     settings = config.train_config
     # Errors are found before anything is written.
-    model = config.build()
+    model = training_model(config)
+    if config.source is not None:
+        corpus, note = with_validation(corpus, model.clip_frames)
+        if note and progress:
+            say(f"{corpus.path}: {note}.")
     find_crops(corpus, "train", model.clip_frames)
     if model.needs_perceptual and config.data().perceptual is None:
         raise InputError(
@@ -73,7 +90,7 @@ def train(
         pose_mirror(config.space)
     spans = stage_spans(model, settings)
     total = spans[-1].stop
-    state = init_state(model, spans, settings.seed)
+    state = init_state(model, spans, settings.seed, start)
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
     _check_folder(out, config, checkpoints, resume, corpus.on_demand)
     if resume and (restored := checkpoints.restore(state)) is not None:
@@ -96,11 +113,12 @@ def train(
         steps = _Steps(config, shape)
         validate = Validator(model, corpus, config)
         ends = {span.stop for span in spans}
-        while done < total:
+        checked = validations(read_metrics(log.path), spans[-1].first, done)
+        while done < total and not ended(settings, checked):
             span = span_at(spans, done)
             part = parts.get(done, stop)
             if part is None:
-                checkpoints.save(state)
+                checkpoints.save(state, checked.best if settings.patience else None)
                 export(state)
                 raise _interrupted(out, done, total)
             state, metrics = steps.of(span, part)(state)
@@ -112,13 +130,21 @@ def train(
             else:
                 log.tick(done)
             if done % settings.validate_every == 0 or done in ends:
-                log.write_validation(done, validate(state.params, span.stage))
-            if done % settings.checkpoint_every == 0 or done in ends or stop.is_set():
+                found = validate(state.params, span.stage)
+                log.write_validation(done, found)
+                if found and span is spans[-1]:
+                    checked = checked.after(done, found["loss"])
+            better = settings.patience > 0 and checked.best == done
+            if done % settings.checkpoint_every == 0 or done in ends or better or stop.is_set():
                 _check_finite(state, done, {}, checkpoints)
-                checkpoints.save(state)
+                checkpoints.save(state, checked.best if settings.patience else None)
                 run = export(state)
             if stop.is_set():
                 raise _interrupted(out, done, total)
+    if settings.patience and checked.best not in (None, int(state.step)):
+        best = checkpoints.restore(state, checked.best)
+        assert best is not None
+        return export(best)
     # A finished run may lack its weights, if it was killed while writing them.
     return run if run is not None else export(state)
 
@@ -143,9 +169,9 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
         raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
     now = json.loads(json.dumps(run_to_json(config, 0)))
     changed = [
-        f"{key.replace('_', ' ')}: {values.get(key)}, now {now[key]}"
-        for key in ("model", "fps", "feature_network")
-        if values.get(key) != now[key]
+        f"{key.replace('_', ' ')}: {values.get(key)}, now {now.get(key)}"
+        for key in ("model", "fps", "feature_network", "from")
+        if values.get(key) != now.get(key)
     ]
     free_settings = _FREE if on_demand else _FREE | {"part_steps"}
     for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):

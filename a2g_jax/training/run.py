@@ -23,6 +23,7 @@ from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual as Perceptual
 from a2g_jax.training.run_config import Run as Run
 from a2g_jax.training.run_config import RunConfig as RunConfig
+from a2g_jax.training.run_config import Source as Source
 from a2g_jax.training.run_file import (
     FORMAT,
     RUN_FILE,
@@ -70,6 +71,7 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         "corpus": config.corpus,
         "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
         "body_extremes": None if config.body_extremes is None else extremes_to_json(config.body_extremes),
+        **({} if config.source is None else {"from": asdict(config.source)}),
     }
 
 
@@ -110,6 +112,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             statistics=statistics,
             corpus=values["corpus"],
             perceptual=Perceptual(values["feature_network"]) if values.get("feature_network") else None,
+            source=from_json(Source, values["from"], str(about)) if values.get("from") else None,
         )
         if values.get("body_extremes") is not None:
             where = f"{about}: body_extremes"

@@ -34,6 +34,26 @@ class Perceptual:
     training needs them."""
 
 
+@dataclass(frozen=True)
+class Source:
+    """The run that a training started from, and what was kept of it."""
+
+    run: str
+    """Its name or folder."""
+    steps: int
+    """Its training steps."""
+    weights: str
+    """SHA-256 of its weights."""
+    corpus: str
+    """Fingerprint of its corpus."""
+    stages: tuple[str, ...] = ()
+    """See :class:`a2g_jax.models.fine_tuning.FineTuning`, as for the other fields."""
+    frozen: tuple[str, ...] = ()
+    pose_statistics: str = "corpus"
+    audio_statistics: str = "corpus"
+    keep_constant: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class RunConfig:
     """The description of a run: everything but its weights."""
@@ -56,6 +76,8 @@ class RunConfig:
     """Sampling settings; None for those of the preset."""
     body_extremes: Values | None = None
     """Extremes of the training split's motion (:func:`~a2g_jax.metrics.body.bounds.extremes`); None if not measured."""
+    source: Source | None = None
+    """The run that training started from; None for initial weights."""
 
     @property
     def entry(self) -> Entry:

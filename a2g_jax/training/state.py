@@ -51,11 +51,18 @@ def trained(update: Update, params: Params) -> Params:
     return {name: params[name] for name in update.trains} if update.trains else params
 
 
-def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int) -> TrainState:
-    """The state at step 0, with the optimisers of all stages."""
+def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int, start: Params | None = None) -> TrainState:
+    """The state at step 0, with the optimisers of all stages.
+
+    Args:
+        start: parameters in place of initial ones.
+    """
     key = jax.random.key(seed)
     # Step numbers count up from 0, so the initial weights take the one number that no step has.
-    params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
+    if start is None:
+        params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
+    else:
+        params = jax.tree.map(jnp.array, start)
     optimisers = {
         optimiser_name(span.stage, update): optimiser_of(update, span.config).init(trained(update, params))
         for span in spans

@@ -18,20 +18,31 @@ from a2g_jax.training.state import joint_loss
 #: Most clips of a validation loss, and of the latent statistics.
 _VALIDATION_CLIPS, _SUMMARY_CLIPS = 64, 4096
 _BATCH = 16
+#: Tilings of the training split of a fine-tuning, which is short, each a fraction of a clip after the one before.
+_TILINGS = 8
 
 
 def _batches(
-    model: Model, corpus: Corpus, config: RunConfig, split: str, most: int, fields: tuple[str, ...] = ()
+    model: Model,
+    corpus: Corpus,
+    config: RunConfig,
+    split: str,
+    most: int,
+    fields: tuple[str, ...] = (),
+    tilings: int = 1,
 ) -> Iterator[Batch]:
     """Batches over clips spread evenly through a split; the last one may be smaller.
 
     Args:
         fields: of the batches; those of training if empty.
+        tilings: times that the split is tiled. Within each, clips that follow one another stay neighbours.
     """
     frames = model.clip_frames
     if not corpus.splits.get(split):
         return
-    starts = tiled_starts(corpus, split, frames)
+    starts = np.concatenate(
+        [tiled_starts(corpus, split, frames, offset=number * frames // tilings) for number in range(tilings)]
+    )
     if len(starts) == 0:
         return
     starts = starts[np.linspace(0, len(starts) - 1, min(most, len(starts))).round().astype(int)]
@@ -98,8 +109,11 @@ def _rebuild(reconstruct: Any, space: PoseSpace, params: Params, batch: Batch, m
 def collect_summary(model: Model, params: Params, corpus: Corpus, config: RunConfig) -> Summary:
     """:attr:`Model.summarise` of clips spread evenly through the training split, one row a clip."""
     summarise = jax.jit(model.summarise)
+    tilings = 1 if config.source is None else _TILINGS
     parts = [
         jax.device_get(summarise(params, jax.random.fold_in(jax.random.key(1), number), batch))
-        for number, batch in enumerate(_batches(model, corpus, config, "train", _SUMMARY_CLIPS, model.summary_fields))
+        for number, batch in enumerate(
+            _batches(model, corpus, config, "train", _SUMMARY_CLIPS, model.summary_fields, tilings)
+        )
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

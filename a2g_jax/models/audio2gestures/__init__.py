@@ -5,7 +5,8 @@ from dataclasses import replace
 from a2g_jax.models.audio2gestures.config import PRESETS, Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.sampling import SAMPLING_PRESETS, Audio2GesturesSampling
 from a2g_jax.models.entry import Entry
-from a2g_jax.models.train_config import TRAIN_PRESETS
+from a2g_jax.models.fine_tuning import FineTuning
+from a2g_jax.models.train_config import TRAIN_PRESETS, TrainConfig
 
 #: Settings of training by preset: the authors' command in addition to the common ones, and long clips.
 _TRAINING = {
@@ -14,6 +15,23 @@ _TRAINING = {
     "tiny": replace(TRAIN_PRESETS["tiny"], batch_size=4),
 }
 
+#: The decoder learns how the person moves in the game with the discriminator, whose loss counts more than usual: a
+#: minute of motion is learned by heart otherwise. The encoders stay, and so do the audio's z-scores.
+_FINE_TUNING = FineTuning(
+    TrainConfig(
+        steps=300,
+        batch_size=4,
+        learning_rate=1e-3,
+        augmentation=1.0,
+        checkpoint_every=50,
+        validate_every=50,
+        patience=4,
+    ),
+    settings={"adversarial_weight": 1.0},
+    stages=("adversarial",),
+    audio_statistics="run",
+)
+
 ENTRY = Entry(
     config=Audio2GesturesConfig,
     presets=PRESETS,
@@ -21,4 +39,5 @@ ENTRY = Entry(
     sampling=Audio2GesturesSampling,
     sampling_presets=SAMPLING_PRESETS,
     training=_TRAINING,
+    fine_tuning=_FINE_TUNING,
 )

@@ -27,8 +27,8 @@ _METRES, _SCORES, _TURNS, _SECONDS = 0.1, 1.0, 0.3, 3.0
 _SLOPE = 0.2
 #: Added to the size of features before division.
 _EPSILON = 1e-6
-#: Learning rate of the decoder in the game.
-_RATE = 3e-4
+#: Learning rate of the decoder in the game, relative to the training's.
+_DECODER = 0.3
 #: The discriminator's, relative to it.
 _DISCRIMINATOR = 0.5
 #: Adam's decay of the first moment in an adversarial game (Radford et al. 2016).
@@ -126,6 +126,19 @@ def adversarial_stage(codec: Codec) -> Stage:
         loss = loss + sum(weights[name] * regression[name] for name in regression)
         return loss, terms | regression
 
+    def validation_loss(
+        params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]
+    ) -> tuple[Float[Array, ""], dict[str, Array]]:
+        """How far motions of drawn codes are from recorded ones (:func:`unlikeness`); all terms are reported.
+
+        The sides of a game do not measure progress, and the motion losses of encoded codes prefer calm motion.
+        """
+        _, game = discriminator_loss(params, key, batch, step)
+        _, terms = decoder_loss(params, key, batch, step)
+        shared, _, _, drawn = _codes(codec, params, key, batch)
+        loss = unlikeness(codec.positions(codec.decode(params, shared, drawn))[1], codec.positions(batch.pose)[1])
+        return loss, game | terms
+
     return Stage(
         (
             Update(discriminator_loss, ("discriminator",), "discriminator", _optimiser(_DISCRIMINATOR)),
@@ -133,7 +146,29 @@ def adversarial_stage(codec: Codec) -> Stage:
         ),
         "adversarial",
         config.adversarial_steps,
+        validation_loss,
     )
+
+
+def unlikeness(made: Float[Array, "B T J D"], recorded: Float[Array, "B T J D"]) -> Float[Array, ""]:
+    """Distance of how two sets of motions move: no motion of one belongs to a motion of the other.
+
+    The mean over joints of the distance of their mean places, in standard deviations of the recorded ones over time,
+    and of the absolute logarithms of the ratios of standard deviation, root mean square speed and root mean square
+    jerk. Joints that do not move in the recordings hardly count: 1 cm (or a tenth of a z-score) is added to both.
+    """
+
+    def size(x: Array, order: int) -> Array:
+        moved = jnp.diff(x, n=order, axis=1) if order else x - jnp.mean(x, axis=(0, 1), keepdims=True)
+        return jnp.sqrt(jnp.mean(jnp.sum(moved**2, axis=-1), axis=(0, 1)))
+
+    floor = 0.01 if made.shape[-1] == 3 else 0.1
+    away = jnp.linalg.norm(jnp.mean(made, axis=(0, 1)) - jnp.mean(recorded, axis=(0, 1)), axis=-1)
+    total = jnp.mean(away / (size(recorded, 0) + floor))
+    for order, least in ((0, floor), (1, floor / 10.0), (3, floor / 10.0)):
+        ratio = (size(made, order) + least) / (size(recorded, order) + least)
+        total += jnp.mean(jnp.abs(jnp.log(ratio)))
+    return total
 
 
 def _codes(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> tuple[Array, Array, Array, Array]:
@@ -156,10 +191,11 @@ def _codes(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> t
 
 
 def _optimiser(factor: float) -> Any:
-    """Adam for one side of the game, its rate, falling to a tenth."""
+    """Adam for one side of the game; its rate falls to a tenth."""
 
     def make(config: TrainConfig) -> optax.GradientTransformation:
-        rate = optax.linear_schedule(factor * _RATE, 0.1 * factor * _RATE, config.steps)
+        peak = factor * _DECODER * config.learning_rate
+        rate = optax.linear_schedule(peak, 0.1 * peak, config.steps)
         return optax.chain(optax.clip_by_global_norm(1.0), optax.adam(rate, b1=_MOMENTUM, b2=0.99))
 
     return make
