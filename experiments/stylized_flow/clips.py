@@ -25,7 +25,7 @@ from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.generator import speech_features
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
-from a2g_jax.generation.stylized_flow.report import StyleTarget, hands_of, report_style
+from a2g_jax.generation.stylized_flow.report import StyleTarget, Verdict, hands_of, report_style
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.poses import rotation_angle
@@ -45,7 +45,8 @@ SPEECHES = (("ada", 777), ("david", 778), ("elif", 779))
 SECONDS = 12.0
 #: Quantiles of validation motion.
 QUANTILES = (1.0, 50.0, 99.0)
-#: Upper-body joints: legs of generated motion stand where the run's stand.
+_WORDS = (Verdict.FOLLOWED, Verdict.PARTLY, Verdict.NOT)
+#: Ends of the names of leg joints, which seams leave out: legs of generated motion stand where the run's stand.
 LEGS = ("Hip", "Knee", "Ankle", "Foot")
 
 
@@ -176,7 +177,7 @@ def table(figures: dict[str, Any]) -> str:
         mean = lambda key, rows=rows: float(np.mean([one[key] for one in rows]))  # noqa: E731
         most = lambda key, rows=rows: max(one[key] for one in rows)  # noqa: E731
         verdicts = [one["verdict"] for one in rows]
-        words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys(verdicts))
+        words = ", ".join(f"{verdicts.count(word)} {word}" for word in _WORDS if word in verdicts)
         seed = row.get("seeded")
         step = f"{seed['step']:.1f} ({seed['step_before']:.1f}) cm" if seed else "refused"
         lines.append(
@@ -188,11 +189,11 @@ def table(figures: dict[str, Any]) -> str:
     return "\n".join([*lines, "", "Refused:", "", *refused, ""])
 
 
-def pictures(path: Path, shown: dict[str, list[Motion]]) -> None:
-    """Film strips: each clip above the motion in its style for the first speeches."""
+def pictures(path: Path, shown: dict[str, dict[str, Motion]]) -> None:
+    """Film strips of a motion in the style of each clip, under the clip where that is no recording of a person."""
     pictures, names = [], []
     for name, motions in shown.items():
-        for motion, what in zip(motions[:2], ("the clip", "its style"), strict=False):
+        for what, motion in motions.items():
             times = np.linspace(3.0, min(9.0, motion.seconds - 0.2), 9)
             pictures.append(strip(motion, times))
             names.append(f"{name}: {what}")
@@ -223,12 +224,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "validation": validation(space, corpus),
         "clips": [],
     }
-    shown: dict[str, list[Motion]] = {}
+    shown: dict[str, dict[str, Motion]] = {}
     for candidate in clips(shared, run.config.fps):
         row, motions = measure_clip(space, candidate, spoken, options.samples)
         figures["clips"].append(row)
         if motions and candidate.group != "generated":
-            shown[candidate.name] = motions
+            own, styled = motions[:2]
+            # Recordings of people are not pictured.
+            above = {} if candidate.group == "real" else {"the clip": own}
+            shown[candidate.name] = above | {"its style": styled}
         print(candidate.name, row.get("refused", "adapted"), flush=True)
     folder = results("stylized_flow")
     write_json(folder / "clips.json", figures)
