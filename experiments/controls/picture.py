@@ -30,9 +30,9 @@ def draw(figures: dict[str, Any], path: Path) -> None:
     figure, axes = pyplot.subplots(2, 3, figsize=(13.5, 8.0))
     for axis, name in zip(axes.flat, PROPERTIES, strict=False):
         _responses(axis, name, figures["runs"])
-    judged = [run["emotions"] for run in figures["runs"].values() if "emotions" in run]
+    judged = {name: run["emotions"] for name, run in figures["runs"].items() if "emotions" in run}
     if judged:
-        _emotions(axes.flat[-1], figures["emotions"], judged[0])
+        _emotions(axes.flat[-1], figures["emotions"], *next(iter(judged.items())))
     else:
         axes.flat[-1].set_axis_off()
     figure.tight_layout()
@@ -59,7 +59,7 @@ def _responses(axis: Axes, name: str, runs: dict[str, Any]) -> None:
     axis.legend(frameon=False, fontsize=8, loc="upper left")
 
 
-def _emotions(axis: Axes, names: list[str], found: dict[str, Any]) -> None:
+def _emotions(axis: Axes, names: list[str], run: str, found: dict[str, Any]) -> None:
     table = np.array(found["table"])
     axis.imshow(table, vmin=0, vmax=1, cmap="Blues")
     for row, column in np.ndindex(*table.shape):
@@ -69,4 +69,4 @@ def _emotions(axis: Axes, names: list[str], found: dict[str, Any]) -> None:
     axis.set_yticks(range(len(names)), names, fontsize=8)
     axis.set_xlabel("classified as", fontsize=9)
     axis.set_ylabel("requested emotion", fontsize=9)
-    axis.set_title(f"emotion: {100 * found['accuracy']['mean']:.0f} % of clips as requested", fontsize=10)
+    axis.set_title(f"emotion, {run}: {100 * found['accuracy']['mean']:.0f} % of clips as requested", fontsize=10)

@@ -15,7 +15,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.generation.stylized_flow.fit import fit
 from a2g_jax.generation.stylized_flow.into_range import Ranges, into_range
 from a2g_jax.generation.stylized_flow.report import StyleTarget
-from a2g_jax.generation.stylized_flow.requests import as_percentiles, matching_requests
+from a2g_jax.generation.stylized_flow.requests import as_quantiles, matching_requests
 from a2g_jax.generation.stylized_flow.seam import continued
 from a2g_jax.generation.stylized_flow.style import within_training
 from a2g_jax.generation.stylized_flow.turning import without_turning
@@ -100,12 +100,12 @@ def test_requests_make_up_for_a_weak_response():
     training = np.random.default_rng(0).normal(size=(500, 3)) * 0.1 + 0.4
     response = np.array([[0.5, 0.1, 0.0], [0.0, 0.4, -0.1], [0.1, 0.0, 0.6]])
 
-    def draw(percentiles):
-        asked = [np.percentile(column, rank) for column, rank in zip(training.T, percentiles, strict=True)]
-        return 0.4 + response @ (np.array(asked) - 0.4)
+    def draw(quantiles):
+        requested = [np.quantile(column, rank) for column, rank in zip(training.T, quantiles, strict=True)]
+        return 0.4 + response @ (np.array(requested) - 0.4)
 
     goal = 0.4 + np.array([0.05, -0.05, 0.05])
-    at_once = np.abs(draw(as_percentiles(goal, training)) - goal).max()
+    at_once = np.abs(draw(as_quantiles(goal, training)) - goal).max()
     assert np.abs(draw(matching_requests(draw, goal, training)) - goal).max() < 0.35 * at_once
     beyond = matching_requests(draw, np.full(3, 9.0), training)
     np.testing.assert_array_equal(beyond, 100.0)

@@ -202,7 +202,7 @@ class FlowSpace:
         factor = float(np.sqrt(np.square(latents).mean() / max(float(np.square(own).mean()), 1e-12)))
         controls = None
         if self._names:
-            # Of the clip itself, not of its pose within range: they are requested as percentiles.
+            # Of the clip itself, not of its pose within range: they are requested as quantiles.
             places = represent(clip.motion, self.run.config.space.kind, name)[0][:frames]
             controls = self._mean_controls(places)
         measured = replace(clip, code=float(np.median(sizes)), adapted=replace(clip.adapted, latents=factor))
