@@ -100,15 +100,23 @@ def test_requests_make_up_for_a_weak_response():
     training = np.random.default_rng(0).normal(size=(500, 3)) * 0.1 + 0.4
     response = np.array([[0.5, 0.1, 0.0], [0.0, 0.4, -0.1], [0.1, 0.0, 0.6]])
 
-    def draw(quantiles):
-        requested = [np.quantile(column, rank) for column, rank in zip(training.T, quantiles, strict=True)]
-        return 0.4 + response @ (np.array(requested) - 0.4)
+    median = np.median(training, axis=0)
+
+    def draw(quantiles, gains=(1.0, 1.0, 1.0)):
+        columns = zip(training.T, quantiles, strict=True)
+        sent = median + np.array(gains) * (np.array([np.quantile(*column) for column in columns]) - median)
+        return 0.4 + response @ (sent - 0.4)
 
     goal = 0.4 + np.array([0.05, -0.05, 0.05])
     at_once = np.abs(draw(as_quantiles(goal, training)) - goal).max()
-    assert np.abs(draw(matching_requests(draw, goal, training)) - goal).max() < 0.35 * at_once
+    found = matching_requests(draw, goal, training)
+    assert np.abs(draw(found) - goal).max() < 0.35 * at_once
     beyond = matching_requests(draw, np.full(3, 9.0), training)
     np.testing.assert_array_equal(beyond, 1.0)
+    # Gains of the run make up for the response, too; the result is the same, and does not overshoot.
+    gains = (2.0, 2.5, 2.5)
+    again = matching_requests(lambda quantiles: draw(quantiles, gains), goal, training, gains)
+    np.testing.assert_allclose(draw(again, gains), draw(found), atol=2e-3)
 
 
 def test_a_motion_begins_in_the_clips_last_pose_with_its_velocity():

@@ -22,7 +22,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
-from a2g_jax.models.control_curves import parse_curves
+from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
@@ -290,7 +290,9 @@ class FlowSpace:
             given = self._given(replace(style, requests=requests), len(beginning), None)
             return self._mean_controls(*self.generator.rows(beginning, LANES, _MATCHED_SEED, **given))
 
-        return replace(style, requests=matching_requests(draw, goal, np.asarray(self.run.summary["control_mean"])))
+        training, settings = np.asarray(self.run.summary["control_mean"]), self.run.config.sampling_settings
+        gains = parse_gains(settings.control_gains, self._names)
+        return replace(style, requests=matching_requests(draw, goal, training, gains))
 
     def _beginning(self, features: LogMel) -> LogMel:
         return features[: round(_MATCHED * self.run.config.fps)]

@@ -4,7 +4,7 @@ Motion follows a request in part, and how far depends on the speech, on the othe
 request is corrected by what motion did with it: a few samples are drawn, measured, and what is lacking is added.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +15,9 @@ PASSES = 3
 Values = Float[np.ndarray, " K"]
 
 
-def matching_requests(draw: Callable[[Values], Values], goal: Values, training: Float[np.ndarray, "N K"]) -> Values:
+def matching_requests(
+    draw: Callable[[Values], Values], goal: Values, training: Float[np.ndarray, "N K"], gains: Sequence[float] = ()
+) -> Values:
     """Requests, as quantiles of the training clips, with which drawn motion has about the goal's controls.
 
     Requests stay within the range of the training clips, so that a goal beyond it is reached as far as the model can.
@@ -24,12 +26,18 @@ def matching_requests(draw: Callable[[Values], Values], goal: Values, training: 
         draw: mean controls of motion that is drawn with such requests; the same draws for each call.
         goal: controls, metres and m/s.
         training: mean controls of every training clip.
+        gains: factors of the run on the distance of a request from the median; 1 if empty. They make up for a weak
+            response as well, and doing so twice would overshoot and swing.
     """
-    low, high = training.min(axis=0), training.max(axis=0)
+    low, high, median = training.min(axis=0), training.max(axis=0), np.median(training, axis=0)
+
+    def quantiles(values: Values) -> Values:
+        return as_quantiles(median + (values - median) / np.array(gains or 1.0), training)
+
     requested = np.clip(goal, low, high)
     for _ in range(PASSES):
-        requested = np.clip(requested + goal - draw(as_quantiles(requested, training)), low, high)
-    return as_quantiles(requested, training)
+        requested = np.clip(requested + goal - draw(quantiles(requested)), low, high)
+    return quantiles(requested)
 
 
 def as_quantiles(values: Values, training: Float[np.ndarray, "N K"]) -> Values:
