@@ -55,7 +55,8 @@ def clip_properties(config: Audio2GesturesConfig, data: Data, names: tuple[str, 
     if not names:
         return {}
     joints = named_joints(data.space.skeleton.names)
-    places = data.space.joint_positions(data.space.rotations(batch.pose))
+    rotations: Any = data.space.rotations(batch.pose)
+    places = data.space.joint_positions(rotations)
     wrists = jnp.array([joints["L_Wrist"], joints["R_Wrist"]])
     clips, parts = len(places), clip_parts(config, data)
     pieces = places.reshape(clips * parts, -1, *places.shape[2:])
