@@ -151,7 +151,7 @@ def test_a_gru_forgets_within_its_context():
     random = np.random.default_rng(8)
     audio = random.normal(size=(640, BANDS)).astype(np.float32)
     other = np.concatenate([random.normal(size=(128, BANDS)).astype(np.float32), audio[128:]])
-    encode = jax.jit(lambda audio: model.condition(params, {}, Condition(audio)).mean)
+    encode = jax.jit(lambda audio: model.condition(params, {}, Condition(audio)).shared.mean)
     first, second = np.asarray(encode(audio))[0], np.asarray(encode(other))[0]
     assert np.abs(first - second)[:128].max() > 0.1
     assert np.abs(first - second)[128 + 256 :].max() < 1e-5
