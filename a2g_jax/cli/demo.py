@@ -8,7 +8,6 @@ from typing import Any
 from a2g_jax.cli import sampling
 from a2g_jax.cli.paths import existing_file, existing_run
 from a2g_jax.errors import InputError
-from a2g_jax.progress import progress_bar
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
 #: Minutes of generated recordings that ``--train`` trains on.
@@ -89,6 +88,7 @@ def _compare(options: argparse.Namespace) -> None:
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.generation.comparison import Speech, compare, demo_speech_with_truth, systems
     from a2g_jax.io.audio import read_audio
+    from a2g_jax.progress import progress_bar
 
     keep_compilations()
     speech = demo_speech_with_truth()

@@ -199,6 +199,10 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         existing_file(options.reader, "name a Python file that defines DATASET")
     existing_folder(options.source)
     existing_file(options.labels, "make it with 'a2g label'")
+    existing_run(options.for_run)
+    for name in _OF_RUN if options.for_run is not None else ():
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name}: is decided by --for {options.for_run}; leave one of them out.")
 
     from a2g_jax.data.datasets import find_data_set
     from a2g_jax.data.prepare import prepare_data_set
@@ -228,11 +232,6 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
 
 def _of_run(options: argparse.Namespace) -> "tuple[Features, Skeleton | None]":
     """The features and the body of a run."""
-    existing_run(options.for_run)
-    for name in _OF_RUN:
-        if getattr(options, name) is not None:
-            raise InputError(f"--{name}: is decided by --for {options.for_run}; leave one of them out.")
-
     from a2g_jax.data.settings import Features
     from a2g_jax.training.run import open_run
 

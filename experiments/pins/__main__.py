@@ -51,7 +51,8 @@ def main() -> None:
     with atomic_path(RESULTS / "pins.md") as temporary:
         temporary.write_text(markdown(figures), encoding="utf-8")
     if not options.no_picture:
-        picture(RESULTS / "pins.png", shown, [*real, generated[2]], limit)
+        # Not the people's own motion, which may not be published.
+        picture(RESULTS / "pins.png", shown, generated[2:5], limit)
 
 
 if __name__ == "__main__":

@@ -7,19 +7,19 @@ from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.stylized_flow.config import PRESETS, TRAINING_PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.sampling import SAMPLING_PRESETS, StylizedFlowSampling
 
-#: The encoders stay: a minute of speech is learned by heart. Constant channels have no density, and the others keep
-#: theirs.
+#: The encoder of the audio stays, and steps are few: a minute of speech is learned by heart. Constant channels have no
+#: density, and the others keep theirs.
 _FINE_TUNING = FineTuning(
     replace(
         TRAINING_PRESETS["tiny"],
         steps=100,
-        learning_rate=1e-4,
+        learning_rate=3e-4,
         warmup_steps=20,
         checkpoint_every=25,
         validate_every=25,
         patience=3,
     ),
-    frozen=("audio_encoder", "global_encoder", "style_encoder"),
+    frozen=("audio_encoder",),
     audio_statistics="run",
     keep_constant=True,
 )
