@@ -69,6 +69,9 @@ class EmotionGestureConfig:
     sigmoid and softmax begin saturated."""
     query_positions: bool = False
     """Whether the decoder's queries have a position encoding; without one, zeros are the same query at every frame."""
+    hold_seed: bool = False
+    """Whether the decoder's output is added to the initial poses, of which the last one is held and fades to the mean
+    pose by learned shares."""
     normalise_pose: bool = False
     """Whether networks and losses have poses as z-scores; poses of other kinds than 6D always are."""
     discriminator_channels: int = 128
@@ -174,6 +177,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         word_buckets=2048,
         scaled_scores=True,
         query_positions=True,
+        hold_seed=True,
         normalise_pose=True,
         discriminator_channels=64,
         discriminator_layers=1,

@@ -12,6 +12,8 @@ from a2g_jax.nn.rates import resized
 from a2g_jax.nn.se_resnet import SEResNet, convolution, group_norm
 
 _XAVIER = nn.initializers.xavier_uniform()
+#: Slope of the leaky rectifier below zero.
+_SLOPE = 0.2
 #: Regions of frequency that the aligned header keeps apart.
 _REGIONS = 4
 
@@ -19,6 +21,15 @@ _REGIONS = 4
 def dense(features: int) -> nn.Dense:
     """A linear layer with Xavier's uniform weights, as the authors initialise all of theirs."""
     return nn.Dense(features, kernel_init=_XAVIER)
+
+
+def bent(x: Array) -> Array:
+    """The rectifier of all perceptrons: leaky, so that none of their units stops to learn.
+
+    Outputs that agree with no target yet are first drawn to the median pose. Plain rectifiers get there by switching
+    themselves off, all at once, and stay there.
+    """
+    return nn.leaky_relu(x, _SLOPE)
 
 
 class Projector(nn.Module):
@@ -29,7 +40,7 @@ class Projector(nn.Module):
 
     @nn.compact
     def __call__(self, x: Float[Array, "B N C"], deterministic: bool) -> Float[Array, "B N D"]:
-        hidden = nn.Dropout(self.dropout)(nn.relu(dense(self.features)(x)), deterministic=deterministic)
+        hidden = nn.Dropout(self.dropout)(bent(dense(self.features)(x)), deterministic=deterministic)
         projected: Float[Array, "B N D"] = dense(self.features)(hidden)
         return projected
 
@@ -87,7 +98,7 @@ class EmotionClassifier(nn.Module):
     def __call__(self, features: Float[Array, "B N D"]) -> Float[Array, "B E"]:
         x = features.reshape(len(features), -1) if self.pool == "flat" else jnp.mean(features, axis=1)
         for width in self.hidden:
-            x = nn.relu(dense(width)(x))
+            x = bent(dense(width)(x))
         logits: Float[Array, "B E"] = dense(self.classes)(x)
         return logits
 

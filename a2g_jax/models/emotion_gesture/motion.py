@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from flax import linen as nn
 from jaxtyping import Array, Float
 
-from a2g_jax.models.emotion_gesture.mining import dense
+from a2g_jax.models.emotion_gesture.mining import bent, dense
 from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
 
 
@@ -36,9 +36,22 @@ class PoseDecoder(nn.Module):
         for _ in range(self.layers):
             x = PostNormLayer(channels, self.heads, self.hidden, self.dropout)(x, audio, deterministic)
         for width in (4 * channels, channels):
-            x = nn.Dropout(self.dropout)(nn.relu(dense(width)(x)), deterministic=deterministic)
+            x = nn.Dropout(self.dropout)(bent(dense(width)(x)), deterministic=deterministic)
         poses: Float[Array, "B N C"] = dense(self.values)(dense(self.values)(x))
         return poses
+
+
+class SeedHold(nn.Module):
+    """The initial poses, and after them the last one on its way to a mean pose, by a learned share for each value."""
+
+    frames: int
+
+    @nn.compact
+    def __call__(self, seed: Float[Array, "B M C"], mean: Float[Array, " C"]) -> Float[Array, "B N C"]:
+        later = self.frames - seed.shape[1]
+        share = nn.sigmoid(self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2])))[None]
+        centre = mean[None, None]
+        return jnp.concatenate([seed, centre + share * (seed[:, -1:] - centre)], axis=1)
 
 
 class Discriminator(nn.Module):
@@ -52,8 +65,8 @@ class Discriminator(nn.Module):
     @nn.compact
     def __call__(self, offsets: Float[Array, "B N C"]) -> Float[Array, " B"]:
         x = Encoder(self.layers, self.heads, 4 * self.channels, 0.0)(dense(self.channels)(offsets), True)
-        x = nn.relu(dense(self.channels // 2)(x)).reshape(len(offsets), -1)
+        x = bent(dense(self.channels // 2)(x)).reshape(len(offsets), -1)
         for width in self.hidden:
-            x = nn.relu(dense(width)(x))
+            x = bent(dense(width)(x))
         logits: Float[Array, "B 1"] = dense(1)(x)
         return logits[:, 0]

@@ -4,13 +4,14 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Data, Params
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder, EmotionClassifier, Projector, TextEncoder, unmined
-from a2g_jax.models.emotion_gesture.motion import Discriminator, PoseDecoder
+from a2g_jax.models.emotion_gesture.motion import Discriminator, PoseDecoder, SeedHold
 from a2g_jax.models.emotion_gesture.prompter import PosePrompter
 from a2g_jax.models.emotion_gesture.vae import FeatureDecoder, FeatureEncoder
 from a2g_jax.nn.transformer import Encoder
@@ -63,7 +64,11 @@ class Networks:
             modules["classifier"] = EmotionClassifier(c.emotion_hidden, self.classes, c.emotion_pool)
         if c.mines and c.beat_weight > 0:
             modules["text"] = TextEncoder(c.word_buckets, c.word_width, c.word_layers, c.channels, c.dropout)
+        if c.hold_seed:
+            modules["hold"] = SeedHold(c.clip_frames)
         self._generator: dict[str, Any] = modules
+        mean = np.zeros(self.rows) if self.normalised else np.asarray(data.pose_statistics.mean)
+        self._mean = mean.reshape(-1).astype(np.float32)
         self._discriminator = Discriminator(
             c.discriminator_channels, c.discriminator_layers, c.heads, c.discriminator_hidden
         )
@@ -88,6 +93,7 @@ class Networks:
             "encoder": (rows, True),
             "prompter": (jnp.zeros((1, c.seed_frames, self.values)), True),
             "decoder": (rows, rows, True),
+            "hold": (jnp.zeros((1, c.seed_frames, self.values)), jnp.zeros(self.values)),
         }
         params: Params = {
             "generator": {
@@ -150,7 +156,11 @@ class Networks:
         fused = self._apply(params, "fusion", key, mixed)
         memory = self._apply(params, "encoder", key, fused)
         prompt = self._apply(params, "prompter", key, seed)
-        return self._apply(params, "decoder", key, prompt, memory)
+        made: Float[Array, "B N C"] = self._apply(params, "decoder", key, prompt, memory)
+        if self.config.hold_seed:
+            own = {"params": params["generator"]["hold"]}
+            made = made + self._generator["hold"].apply(own, seed, jnp.asarray(self._mean, seed.dtype))
+        return made
 
     def judge(self, params: Params, motion: Float[Array, "B N C"]) -> Float[Array, " B"]:
         """The discriminator's logits of motions."""

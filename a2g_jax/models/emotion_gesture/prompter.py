@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from flax import linen as nn
 from jaxtyping import Array, Float
 
-from a2g_jax.models.emotion_gesture.mining import dense
+from a2g_jax.models.emotion_gesture.mining import bent, dense
 from a2g_jax.nn.conv import Conv1D
 from a2g_jax.nn.se_resnet import group_norm
 
@@ -65,7 +65,7 @@ class PoseEncoder(nn.Module):
 
     @nn.compact
     def __call__(self, poses: Float[Array, "B N C"], deterministic: bool) -> Float[Array, "B N D"]:
-        hidden = nn.Dropout(self.dropout)(nn.relu(dense(self.features)(poses)), deterministic=deterministic)
+        hidden = nn.Dropout(self.dropout)(bent(dense(self.features)(poses)), deterministic=deterministic)
         encoded: Float[Array, "B N D"] = dense(self.features)(hidden)
         return encoded
 
@@ -91,7 +91,7 @@ class ChunkEncoder(nn.Module):
 
     @nn.compact
     def __call__(self, chunk: Float[Array, "B L W"], deterministic: bool) -> Float[Array, "B D"]:
-        hidden = nn.relu(dense(self.features)(chunk.reshape(len(chunk), -1)))
+        hidden = bent(dense(self.features)(chunk.reshape(len(chunk), -1)))
         encoded: Float[Array, "B D"] = dense(self.features)(
             nn.Dropout(self.dropout)(hidden, deterministic=deterministic)
         )
