@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from a2g_jax.cli.argument_types import number, share
 from a2g_jax.cli.paths import existing_corpus, existing_file
 from a2g_jax.errors import InputError
+from a2g_jax.generation.pins.form import parse_pin
 
 if TYPE_CHECKING:
     from a2g_jax.data.corpus import Corpus
@@ -101,12 +102,10 @@ def check_files(options: argparse.Namespace) -> None:
     """Refuse clips, speeches and corpora that do not exist.
 
     Raises:
-        InputError: there is no such file or corpus.
+        InputError: there is no such file or corpus, or a pin has another form.
     """
     for text in options.pin or ():
-        path, at, _ = text.rpartition("@")
-        if at:
-            existing_file(path)
+        existing_file(str(parse_pin(text)[0]))
     existing_corpus(options.pin_corpus)
     for name in ("style", "style_audio", "style_with", "style_with_audio", "seed_clip"):
         existing_file(getattr(options, name))

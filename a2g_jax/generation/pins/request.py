@@ -1,8 +1,6 @@
 """Pins: a clip and its second, read from ``FILE@SECOND[+LENGTH]`` and adapted to a run's body, rate and facing."""
 
-import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +8,13 @@ import numpy as np
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clip_fit import Bounds, ClipFit, animal_joints, leading_t_pose, measure_clip, refusals
 from a2g_jax.generation.clips import read_motion
+from a2g_jax.generation.pins.form import parse_pin as parse_pin
 from a2g_jax.generation.pins.repair import repair_flips
 from a2g_jax.generation.pins.smooth import resample_smoothly
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import face, on_skeleton
 from a2g_jax.training.run import Run
 
-#: A file, a second from 0 on, and optionally the length in seconds.
-_FORM = re.compile(r"(?P<path>.+)@(?P<start>\d+\.?\d*|\.\d+)(\+(?P<length>\d+\.?\d*|\.\d+))?")
 #: Metres of a root's path from which its loss is reported.
 _TRAVEL = 0.3
 #: Jerk of hands that shake, m/s3: twice that of the liveliest talk.
@@ -49,22 +46,6 @@ class Pin(NamedTuple):
     def stop(self) -> int:
         """Frame after the last one of the stretch."""
         return self.first + self.motion.frames
-
-
-def parse_pin(text: str) -> tuple[Path, float, float | None]:
-    """File, second and length of ``wave.bvh@3.2`` (the whole clip) or ``wave.bvh@3.2+1.5`` (its first 1.5 seconds).
-
-    Raises:
-        InputError: another form.
-    """
-    found = _FORM.fullmatch(text)
-    if found is None:
-        raise InputError(
-            f"--pin {text}: expected a file and a second from 0 on, such as wave.bvh@3.2, or wave.bvh@3.2+1.5 for the"
-            " clip's first 1.5 seconds."
-        )
-    length = found["length"]
-    return Path(found["path"]), float(found["start"]), None if length is None else float(length)
 
 
 def read_pin(text: str, run: Run) -> Pin:
