@@ -8,7 +8,7 @@ import numpy as np
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clip_fit import Bounds, ClipFit, animal_joints, leading_t_pose, measure_clip, refusals
 from a2g_jax.generation.clips import read_motion
-from a2g_jax.generation.pins.form import parse_pin as parse_pin
+from a2g_jax.generation.pins.form import parse_pin
 from a2g_jax.generation.pins.repair import repair_flips
 from a2g_jax.generation.pins.smooth import resample_smoothly
 from a2g_jax.geometry.motion import Motion
