@@ -29,7 +29,8 @@ VARIANTS = {
     "authors": replace(CONFIG, header="channels", prompt_space="poses", emotion_pool="flat", scaled_scores=False),
     "zero": replace(CONFIG, prompter="zero", branches="none"),
     "duplicate": replace(CONFIG, prompter="duplicate", branches="label"),
-    "spatial": replace(CONFIG, prompter="spatial", query_positions=False, normalise_pose=False),
+    "spatial": replace(CONFIG, prompter="spatial", query_positions=False, normalise_pose=False, hold_seed=False),
+    "raw": replace(CONFIG, normalise_pose=False),
 }
 
 
@@ -175,6 +176,23 @@ def test_interpolated_time():
     np.testing.assert_allclose(resized(jnp.ones((1, 31, 2)), 60), 1.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("normalise", [True, False])
+def test_the_held_pose_fades_to_the_mean_pose(normalise):
+    """With a decoder of zeros the motion is the seed poses, and half of the last one's offset from the mean after."""
+    config, data = replace(CONFIG, normalise_pose=normalise), make_data()
+    networks = Networks(config, data)
+    params = make_params(build(config, data))
+    generator = dict(params["generator"])
+    generator["decoder"] = jax.tree.map(jnp.zeros_like, generator["decoder"])
+    generator["hold"] = jax.tree.map(jnp.zeros_like, generator["hold"])
+    batch = make_batch()
+    pose = networks.pose(generate(networks, {**params, "generator": generator}, batch)[1])[0]
+    seed = batch.pose[0, : config.seed_frames]
+    np.testing.assert_allclose(pose[: config.seed_frames], seed, atol=1e-5)
+    half = (seed[-1] + data.pose_statistics.mean) / 2
+    np.testing.assert_allclose(pose[config.seed_frames :], np.tile(half, (config.stride, 1, 1)), atol=1e-5)
+
+
 def test_positions_are_those_of_the_formula():
     table = sinusoids(7, 6)
     for frame in range(7):
@@ -229,7 +247,7 @@ class TestObjective:
         moved = {
             "beat": {"audio", "beat", "text"},
             "emotion": {"audio", "emotion", "classifier"},
-            "smooth": {"audio", "emotion", "beat", "fusion", "encoder", "prompter", "decoder"},
+            "smooth": {"audio", "emotion", "beat", "fusion", "encoder", "prompter", "decoder", "hold"},
         }
         for name, expected in moved.items():
             gradient = function(params, choose(name))[1]["generator"]
