@@ -96,16 +96,20 @@ def _compare(options: argparse.Namespace) -> None:
         speech = Speech(Path(options.audio).name, lambda sample_rate: read_audio(options.audio, sample_rate))
     runs = systems(options.compare)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
-        written = compare(
+        compared = compare(
             runs,
             speech,
             options.out,
             samples=options.samples,
             seed=options.seed,
             formats=options.formats,
+            controls=options.control or (),
+            strict=options.strict,
             report=lambda: bar.update(),
         )
-    sampling.print_written(options.out, written)
+    sampling.print_written(options.out, compared.written)
+    for line in compared.lines:
+        print(line)
 
 
 def _train(out: Path) -> Any:
