@@ -1,6 +1,6 @@
 """The window loop: motions of any length from a model, window by window."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -51,8 +51,9 @@ class Engine:
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
         space, draw, begin, proceed = run.config.space, model.sample, model.begin, model.proceed
-        self._lines = getattr(run.config.sampling_settings, "controls", ())
-        if model.controls is not None and self._lines:
+        #: Requests of the sampling settings.
+        self.lines: Sequence[str] = getattr(run.config.sampling_settings, "controls", ())
+        if model.controls is not None and self.lines:
             check_stored(run, model.controls)
 
         @jax.jit
@@ -166,13 +167,13 @@ class Engine:
     def _controls(self, given: Condition) -> Any:
         """Requested controls, frame by frame; None where there are none and the model needs none."""
         found = self.model.controls
-        if found is None or (found.free and given.controls is None and not self._lines):
+        if found is None or (found.free and given.controls is None and not self.lines):
             return None
         check_stored(self.run, found)
         if given.controls is not None:
             check_rows(np.asarray(given.controls), found)
             return given.controls
-        curves = parse_curves(self._lines, found.names, found.categories)
+        curves = parse_curves(self.lines, found.names, found.categories)
         return sampled(curves, 0, len(given.audio), self.run.config.fps)
 
     def _waveform(self, given: Condition, start: int, frames: int) -> Any:
