@@ -16,7 +16,7 @@ from a2g_jax.features.hand_properties import PROPERTIES
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.audio2gestures.model import build
-from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.models.audio2gestures.sampling import SAMPLING_PRESETS, Audio2GesturesSampling
 from a2g_jax.models.audio2gestures.stored import (
     EMOTION,
     HOLD,
@@ -30,6 +30,7 @@ from a2g_jax.models.audio2gestures.stored import (
 )
 from a2g_jax.models.base import Data
 from a2g_jax.talker.skeleton import TALKER_SKELETON
+from a2g_jax.training.run import demo_run
 
 SIZE, STEPS, PARTS, CLIPS = 16, 8, 2, 60
 STORED = replace(
@@ -150,6 +151,12 @@ def test_gains_stretch_requests():
     weights = log_weights(NAMES, gains, SUMMARY, rows(height=0.7))
     steps = stored_steps(KEY, CODES, gains, jnp.int32(0), 256, SIZE, weights)[:, 0]
     assert property_of(steps, "height").mean() > plain + 0.2
+
+
+def test_gains_are_those_of_a_run_and_not_of_a_preset():
+    """Another run of the preset responds otherwise."""
+    assert not any(preset.control_gains for preset in SAMPLING_PRESETS.values())
+    assert demo_run().config.sampling_settings.control_gains
 
 
 def test_the_summary_holds_the_properties_of_every_part():
