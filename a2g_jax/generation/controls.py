@@ -26,6 +26,22 @@ def control_rows(run: Run, lines: Sequence[str], frames: int) -> Rows:
     return sampled(parse_curves(lines, controls.names, controls.categories), 0, frames, run.config.fps)
 
 
+def stored_rows(run: Run, controls: Controls | None, frames: int) -> Rows | None:
+    """The ``controls`` of a condition from the run's sampling settings; None where the model needs none.
+
+    Args:
+        controls: of the run's model.
+
+    Raises:
+        InputError: a run that stores too little for them.
+    """
+    lines = getattr(run.config.sampling_settings, "controls", ())
+    if controls is None or (controls.free and not lines):
+        return None
+    check_stored(run, controls)
+    return sampled(parse_curves(lines, controls.names, controls.categories), 0, frames, run.config.fps)
+
+
 def controls_of(run: Run) -> Controls:
     """The controls of a run: their names, and those of categories.
 
