@@ -172,6 +172,20 @@ def test_the_summary_holds_the_properties_of_every_part():
     assert clip_properties(STORED, DATA, (), batch) == {}
 
 
+def test_recordings_without_an_emotion_are_no_emotion():
+    """An empty name is no category of requests, and its clips are drawn for none of the others."""
+    data = DATA._replace(emotions=("", "calm", "glad"))
+    controls = build(STORED, data).controls
+    assert controls is not None
+    assert controls.categories == {EMOTION: ("calm", "glad")}
+    with pytest.raises(InputError, match="there is no ''.*there are: calm, glad"):
+        build(STORED, data, Audio2GesturesSampling(controls=("emotion=@0",)))
+    pose = jnp.asarray(np.tile(MEAN, (3, STORED.clip_frames, 1, 1)), jnp.float32)
+    batch = Batch(jnp.zeros((3, STORED.clip_frames, 5)), pose, emotion=jnp.array([0, 1, 2]))
+    np.testing.assert_array_equal(clip_properties(STORED, data, NAMES, batch)[LABELS], [-1, 0, 1])
+    assert control_names(STORED, data._replace(emotions=("", "calm"))) == PROPERTIES
+
+
 def test_which_runs_have_which_controls():
     assert control_names(STORED, DATA) == NAMES
     assert control_names(STORED, DATA._replace(emotions=("calm",))) == PROPERTIES
