@@ -60,6 +60,12 @@ def continue_clips(
     return np.concatenate(made)
 
 
+def _controls(run: Run, model: Model, frames: int) -> Any:
+    """Requested controls of a clip's frames; None where the model needs none."""
+    rows = stored_rows(run, model.controls, frames)
+    return None if rows is None else jnp.asarray(rows)
+
+
 def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
     """A function that draws the frames one after another, all clips and samples in parallel."""
     history, lookahead = model.seed_frames, model.lookahead
@@ -68,7 +74,7 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
             f"expected frames from {history} to {frames - lookahead} of clips of {frames}; got {first} to {last}"
         )
     condition, begin, proceed, space = model.condition, model.begin, model.proceed, run.config.space
-    controls: Any = stored_rows(run, model.controls, frames)
+    controls = _controls(run, model, frames)
     assert condition is not None
     assert begin is not None
     assert proceed is not None
@@ -95,9 +101,9 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
 def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
     """A function that draws motions of whole clips and takes the frames from them."""
     condition, sample, space = model.condition, model.sample, run.config.space
-    controls: Any = stored_rows(run, model.controls, frames)
+    controls = _controls(run, model, frames)
     if controls is not None:
-        controls = np.pad(controls, ((0, -frames % BLOCK), (0, 0)), mode="edge")
+        controls = jnp.pad(controls, ((0, -frames % BLOCK), (0, 0)), mode="edge")
     assert condition is not None
     assert sample is not None
 
