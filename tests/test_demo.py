@@ -79,9 +79,9 @@ def test_hands_rise_on_request_and_not_without_one(tmp_path, capsys):
 def test_weights_without_properties_refuse_controls_and_name_the_remedy():
     run = demo_run()
     old = replace(run, summary={"specific_code": run.summary["specific_code"]})
-    asked = replace(old, config=old.config.with_sampling(controls=("energy=0.9",)))
+    requested = replace(old, config=old.config.with_sampling(controls=("energy=0.9",)))
     with pytest.raises(InputError, match="a2g train audio2gestures --resume"):
-        Generator(asked)
+        Generator(requested)
     with pytest.raises(InputError, match="--resume"):
         control_rows(old, ("energy=0.9",), 30)
     Generator(old)

@@ -92,8 +92,8 @@ def test_free_controls_leave_every_code_as_it_is(seed):
 
 
 def test_a_free_stretch_keeps_its_codes_beside_a_requested_one():
-    asked = jnp.where(jnp.arange(4096) < 2048, jnp.nan, 0.9)
-    free, half = drawn(KEY, rows()), drawn(KEY, rows(height=asked))
+    requested = jnp.where(jnp.arange(4096) < 2048, jnp.nan, 0.9)
+    free, half = drawn(KEY, rows()), drawn(KEY, rows(height=requested))
     np.testing.assert_array_equal(half[:128], free[:128])
     assert (half[128:] != free[128:]).any()
 
@@ -101,8 +101,10 @@ def test_a_free_stretch_keeps_its_codes_beside_a_requested_one():
 @pytest.mark.parametrize("name", PROPERTIES)
 def test_a_request_draws_clips_with_that_property(name):
     quantiles = np.quantile(np.asarray(SUMMARY[VALUES], np.float32)[..., PROPERTIES.index(name)], [0.1, 0.5, 0.9])
-    for asked, value in zip((0.1, 0.5, 0.9), quantiles, strict=True):
-        found = np.mean([property_of(drawn(jax.random.key(seed), rows(**{name: asked})), name) for seed in range(4)])
+    for requested, value in zip((0.1, 0.5, 0.9), quantiles, strict=True):
+        found = np.mean(
+            [property_of(drawn(jax.random.key(seed), rows(**{name: requested})), name) for seed in range(4)]
+        )
         np.testing.assert_allclose(found, value, atol=0.25)
 
 
@@ -139,7 +141,7 @@ def test_a_constant_request_keeps_whole_parts_and_a_curve_follows_in_holds():
         return np.flatnonzero(~follows) + 1
 
     still = changes(drawn(KEY, rows(height=0.8)))
-    # At the ends of parts alone: whether the clip still fits is asked again there.
+    # At the ends of parts alone: whether the clip still fits is decided anew there.
     assert np.all(still % (STEPS // PARTS) == 0)
     rising = changes(drawn(KEY, rows(height=jnp.linspace(0.0, 1.0, 4096))))
     assert np.all((rising % (HOLD // SIZE) == 0) | (rising % (STEPS // PARTS) == 0))
