@@ -79,12 +79,28 @@ def test_hands_rise_on_request_and_not_without_one(tmp_path, capsys):
 def test_weights_without_properties_refuse_controls_and_name_the_remedy():
     run = demo_run()
     old = replace(run, summary={"specific_code": run.summary["specific_code"]})
-    asked = replace(old, config=old.config.with_sampling(controls=("energy=0.9",)))
+    requested = replace(old, config=old.config.with_sampling(controls=("energy=0.9",)))
     with pytest.raises(InputError, match="a2g train audio2gestures --resume"):
-        Generator(asked)
+        Generator(requested)
     with pytest.raises(InputError, match="--resume"):
         control_rows(old, ("energy=0.9",), 30)
     Generator(old)
+
+
+@pytest.mark.parametrize("line", ["emotion=anger@60", "energy=0.2@0,0.9@1"])
+def test_requests_past_the_end_of_the_speech_are_refused(line, tmp_path, capsys):
+    """Otherwise their values would hold from the start, or never arrive."""
+    run, second = demo_run(), np.ones(16000, np.float32)
+    late = Generator(replace(run, config=run.config.with_sampling(controls=(line,))))
+    for refuse in (late.check, lambda audio: late.generate(audio, 1), lambda _: control_rows(run, (line,), 30)):
+        with pytest.raises(InputError, match="past the end of the speech, which lasts 1.00 s"):
+            refuse(second)
+    write_audio(tmp_path / "speech.wav", second, 16000)
+    flags = ["--audio", str(tmp_path / "speech.wav"), "--control", line, "--out", str(tmp_path / "out")]
+    for command in (["demo"], ["generate", "demo"]):
+        assert main([*command, *flags]) == 2
+        assert "past the end" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,13 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from a2g_jax.cli import main
+from a2g_jax.errors import InputError
 from a2g_jax.generation import comparison
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.npz import read_motion_npz
@@ -40,7 +42,7 @@ def test_compare_shows_every_system_and_the_talker(tmp_path):
     assert np.abs(read_motion_npz(out / "demo_00.npz").positions() - alone.positions()).max() < 1e-3
     # One's own speech has no talker, and the talker of the other speech is gone.
     files = {path.name for path in out.iterdir()}
-    assert files == {"index.html", "talker_00.npz", *(f"{name}_00.npz" for name in SHIPPED)}
+    assert files == {"checks.json", "index.html", "talker_00.npz", *(f"{name}_00.npz" for name in SHIPPED)}
     own = comparison.Speech("speech.wav", lambda _: talk(2.0, 5).audio)
     comparison.compare(comparison.systems(), own, out, samples=1, seed=0, formats=("npz", "html"))
     assert "talker_00.npz" not in {path.name for path in out.iterdir()}
@@ -54,11 +56,21 @@ def test_runs_of_ones_own_are_compared_too(tmp_path, toy_run_config, toy_corpus,
     assert list(found) == [*SHIPPED, "mine"]
     toys = dict.fromkeys(("one", "two-three"), found["mine"])
     speech = comparison.Speech("speech.wav", lambda _: talk(2.0, 5).audio)
-    counts = comparison.compare(toys, speech, tmp_path / "out", samples=2, seed=0, formats=("npz", "html"))
-    assert counts == {"npz": 4, "html": 1}
+    # Reports and motions of earlier calls would belong to other motions.
+    (tmp_path / "out").mkdir()
+    for stale in ("style.json", "sample_03.bvh"):
+        (tmp_path / "out" / stale).write_text("", encoding="utf-8")
+    compared = comparison.compare(toys, speech, tmp_path / "out", samples=2, seed=0, formats=("npz", "html"))
+    assert compared.written == {"npz": 4, "html": 1}
+    checks = json.loads((tmp_path / "out" / "checks.json").read_text(encoding="utf-8"))
+    assert {name: len(each["samples"]) for name, each in checks["systems"].items()} == {"one": 2, "two-three": 2}
+    assert {line.partition(": checked")[0] for line in compared.lines if "checked" in line} == set(toys)
+    assert not {"style.json", "sample_03.bvh"} & {path.name for path in (tmp_path / "out").iterdir()}
     names = [figure["label"] for figure in page_data(tmp_path / "out")["figures"]]
     assert names == ["one 0", "one 1", "two-three 0", "two-three 1"]
     assert (tmp_path / "out" / "two-three_01.npz").is_file()
+    comparison.compare({"one": found["mine"]}, speech, tmp_path / "out", samples=1, seed=0, formats=("npz",))
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"checks.json", "one_00.npz"}
     other = tmp_path / "other" / "mine"
     train(toy_run_config(steps=2), toy_corpus, other, resume=False, progress=False)
     twice = ["demo", "--compare", str(tmp_path / "mine"), str(other), "--out", str(tmp_path / "x")]
@@ -72,3 +84,46 @@ def test_compare_refuses_training_and_what_is_no_run(tmp_path, capsys):
     assert main(["demo", "--compare", str(tmp_path), "--out", str(tmp_path / "x")]) == 2
     assert "not a run" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path, capsys):
+    """The flow has no handedness; its motions stay as they are, and that is reported."""
+    taken = {}
+
+    class Still(Generator):
+        def __init__(self, run):
+            taken[run.config.model] = run.config.sampling_settings.controls
+            self.run = run
+
+        def stream(self, audio, samples, seed=0, **given):
+            yield from [demo_recording()[0].motion] * samples
+
+    monkeypatch.setattr(comparison, "Generator", Still)
+    flags = ["--samples", "1", "--formats", "npz", "--out", str(tmp_path / "out")]
+    requests = ["--control", "handedness=0.9", "--control", "height=0.8"]
+    assert main(["demo", "--compare", *requests, *flags]) == 0
+    assert taken == {"audio2gestures": ("handedness=0.9", "height=0.8"), "stylized_flow": ("height=0.8",)}
+    printed = capsys.readouterr().out
+    assert "demo-flow: has no control for handedness=0.9" in printed
+    assert "demo: checked: " in printed
+    assert main(["demo", "--compare", "--control", "tail=0.9", *flags]) == 2
+    assert "none of demo, demo-flow has a control 'tail'" in capsys.readouterr().err
+    assert main(["demo", "--compare", "--control", "emotion=envy", *flags]) == 2
+    assert "demo: --control 'emotion=envy'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("strict", "worst"), [(True, 3.0), (False, np.nan)])
+def test_a_refused_motion_leaves_the_earlier_files(monkeypatch, tmp_path, strict, worst):
+    """With --strict outside the bounds; without it, one that holds NaN: named by its system."""
+    run = open_run("demo")
+    motion = demo_recording()[0].motion
+    root = motion.root.copy()
+    root[len(root) // 2 :] += worst
+    bad = replace(motion, root=root)
+    monkeypatch.setattr(Generator, "stream", lambda self, audio, samples, seed=0, **given: iter([bad] * samples))
+    (tmp_path / "mine_00.npz").write_text("earlier", encoding="utf-8")
+    speech = comparison.Speech("speech.wav", lambda _: talk(2.0, 5).audio)
+    with pytest.raises(InputError, match="^mine: sample 0: a body cannot do it"):
+        comparison.compare({"mine": run}, speech, tmp_path, samples=1, seed=0, formats=("npz",), strict=strict)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine_00.npz"]
+    assert (tmp_path / "mine_00.npz").read_text(encoding="utf-8") == "earlier"

@@ -129,8 +129,13 @@ def sampler_of(run: "Run", audio: Any, options: argparse.Namespace) -> Chosen:
         audio: (N,), mono, at the run's sample rate.
 
     Raises:
-        InputError: a run or clip that cannot be used for it.
+        InputError: a run or clip that cannot be used for it, or a request past the end of the audio.
     """
+    from a2g_jax.generation.generator import audio_frames
+    from a2g_jax.models.control_curves import check_ends
+
+    lines = getattr(run.config.sampling_settings, "controls", ())
+    check_ends(lines, audio_frames(run, audio), run.config.fps)
     if options.pin_mode == "latent":
         pinned = _in_codes(run, audio, options)
         return _pinned(pinned, Chosen(pinned))

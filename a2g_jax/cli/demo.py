@@ -58,16 +58,13 @@ def _demo(options: argparse.Namespace) -> None:
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.features.mel import MelConfig
     from a2g_jax.generation.controls import control_rows
-    from a2g_jax.generation.generator import Generator
+    from a2g_jax.generation.generator import Generator, audio_frames
     from a2g_jax.io.audio import read_audio
     from a2g_jax.talker.demo_speech import demo_speech
     from a2g_jax.training.run import demo_run
 
     keep_compilations()
     shipped = demo_run()
-    if options.control:
-        # Refused before minutes of training.
-        control_rows(shipped, options.control, 1)
     # Bad audio is refused before minutes of training.
     words: Any = ()
     if options.audio is not None:
@@ -75,6 +72,9 @@ def _demo(options: argparse.Namespace) -> None:
     else:
         speech = demo_speech()
         audio, title, words = speech.audio, "the speech of the demo", speech.words
+    if options.control:
+        # Refused before minutes of training, too.
+        control_rows(shipped, options.control, audio_frames(shipped, audio))
     trained = _train(Path(options.out)) if options.train else shipped
     trained = replace(trained, config=trained.config.with_sampling(controls=tuple(options.control or ())))
     sampling.write_samples(trained, Generator(trained), audio, options, title, words=words)
@@ -96,16 +96,20 @@ def _compare(options: argparse.Namespace) -> None:
         speech = Speech(Path(options.audio).name, lambda sample_rate: read_audio(options.audio, sample_rate))
     runs = systems(options.compare)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
-        written = compare(
+        compared = compare(
             runs,
             speech,
             options.out,
             samples=options.samples,
             seed=options.seed,
             formats=options.formats,
+            controls=options.control or (),
+            strict=options.strict,
             report=lambda: bar.update(),
         )
-    sampling.print_written(options.out, written)
+    sampling.print_written(options.out, compared.written)
+    for line in compared.lines:
+        print(line)
 
 
 def _train(out: Path) -> Any:

@@ -1,4 +1,4 @@
-"""Emotions of scored motions, as a classifier sees them: counts, the section of a report, and a picture."""
+"""Emotions of scored motions, as a classifier recognises them: counts, the section of a report, and a picture."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,8 @@
 """Systems side by side: motions of several runs for one speech, beside the talker's own motion where there is one."""
 
+import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +11,14 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.checked import Checked
+from a2g_jax.generation.compared_controls import with_controls
 from a2g_jax.generation.export import checked_figure
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Generator, audio_frames
 from a2g_jax.generation.talk.page import gesture_lane
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.words import Word
-from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.talker.demo_speech import demo_recording
 from a2g_jax.talker.speech import plan_from_json
 from a2g_jax.training.run import Run, open_run
@@ -25,6 +27,10 @@ from a2g_jax.viz.player import Figure, write_page
 
 #: Stem of the files of the talker's own motion.
 TALKER = "talker"
+#: The checks of all systems, and reports of earlier calls of other commands in the same folder.
+CHECKS = "checks.json"
+_REPORTS = r"(pins|checks|style)\.json"
+_FORMAT = "a2g_jax checks of systems"
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +85,16 @@ def _animates(run: Run) -> bool:
     return run.config.space.has_rotations and run.config.build().sample is not None
 
 
+@dataclass(frozen=True)
+class Compared:
+    """What a comparison wrote."""
+
+    written: dict[str, int]
+    """How many files of each format."""
+    lines: tuple[str, ...]
+    """Result of the check of each system, and the requests that it did not take, for the terminal."""
+
+
 def compare(
     runs: Mapping[str, Run],
     speech: Speech,
@@ -87,61 +103,100 @@ def compare(
     samples: int,
     seed: int,
     formats: Sequence[str],
+    controls: Sequence[str] = (),
+    strict: bool = False,
     report: Callable[[], None] = lambda: None,
-) -> dict[str, int]:
-    """Write the motions of every run for a speech, and one page of them all.
+) -> Compared:
+    """Write the motions of every run for a speech, one page of them all, and ``checks.json``.
 
     Files are named after the runs: ``demo_00.bvh``, ``demo_01.bvh``, ..., and ``talker_00.bvh`` for the truth. Each run
-    generates as alone: its sample k is that of ``a2g generate RUN`` with the same seed.
+    generates as alone: its sample k is that of ``a2g generate RUN`` with the same seed. Nothing is written before all
+    motions are generated and checked; then the files of an earlier call are removed.
 
     Args:
         runs: by name.
         samples: motions of each run.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
+        controls: requests such as ``energy=0.9``, for the runs that have the control.
+        strict: whether a motion that stays outside the bounds of a body is an error.
         report: called after each motion of a run.
 
-    Returns:
-        How many files of each format were written.
-
     Raises:
-        InputError: a folder that cannot be used, audio shorter than a frame, or too large a page.
+        InputError: a folder that cannot be used, audio shorter than a frame, too large a page, a request that no run
+            can follow, or a motion that is refused.
     """
+    runs, without = with_controls(runs, controls)
     first = next(iter(runs.values())).config
     audio = {run.config.mel.sample_rate: speech.audio(run.config.mel.sample_rate) for run in runs.values()}
     if PAGE in formats:
         sizes = [(audio_frames(run, audio[run.config.mel.sample_rate]), run.config.skeleton) for run in runs.values()]
         frames, body = max(sizes, key=lambda size: size[0] * size[1].joints)
         check_page_size(samples * len(runs) + 1, frames, body.joints)
+    folder = make_folder(out)  # a folder that cannot be used is refused before any work
+    checked = {name: Checked(run, Generator(run), strict=strict) for name, run in runs.items()}
+    motions = {
+        name: _motions(name, each, audio[runs[name].config.mel.sample_rate], samples, seed, report)
+        for name, each in checked.items()
+    }
     # This removes the talker's motion of an earlier speech, also where this one has none.
-    written = {name: MotionFiles(out, name, formats) for name in (TALKER, *runs)}
+    stems = dict.fromkeys((*_stems_before(folder), "sample", TALKER, *runs))
+    files = {stem: MotionFiles(folder, stem, formats, _REPORTS) for stem in stems}
     figures = [] if speech.truth is None else [speech.truth]
-    for name, number, motion, findings in _motions(runs, audio, samples, seed):
-        written[name].write(number, motion)
-        label = f"{name} {number}" if samples > 1 else name
-        figures.append(checked_figure(motion, label, findings, runs[name].config.model))
-        report()
+    for name, made in motions.items():
+        for number, motion in enumerate(made):
+            files[name].write(number, motion)
+            label = f"{name} {number}" if samples > 1 else name
+            findings = checked[name].reports[number].findings
+            figures.append(checked_figure(motion, label, findings, _note(runs[name], without.get(name, ()))))
     if speech.truth is not None:
-        written[TALKER].write(0, speech.truth.motion)
+        files[TALKER].write(0, speech.truth.motion)
+    write_json(folder / CHECKS, {"format": _FORMAT, "systems": {name: one.to_json() for name, one in checked.items()}})
     if PAGE in formats:
         write_page(
-            written[TALKER].folder / "index.html",
+            folder / "index.html",
             figures,
             audio[first.mel.sample_rate],
             first.mel.sample_rate,
             title=f"{_count(len(runs))} for {speech.title}",
-            subtitle=_subtitle(speech, samples, seed),
+            subtitle=_subtitle(speech, samples, seed) + (f"; {', '.join(controls)}" if controls else ""),
             words=speech.words,
         )
-    return {kind: 1 if kind == PAGE else len(figures) for kind in formats}
+    lines = [f"{name}: {line}" for name, each in checked.items() for line in each.lines()]
+    lines += [f"{name}: has no control for {', '.join(rest)}" for name, rest in without.items()]
+    return Compared({kind: 1 if kind == PAGE else len(figures) for kind in formats}, tuple(lines))
 
 
 def _motions(
-    runs: Mapping[str, Run], audio: Mapping[int, Float[np.ndarray, " N"]], samples: int, seed: int
-) -> Iterator[tuple[str, int, Motion, Sequence[BodyFinding]]]:
-    for name, run in runs.items():
-        checked = Checked(run, Generator(run))
-        for number, motion in enumerate(checked.stream(audio[run.config.mel.sample_rate], samples, seed)):
-            yield name, number, motion, checked.reports[number].findings
+    name: str,
+    checked: Checked,
+    audio: Float[np.ndarray, " N"],
+    samples: int,
+    seed: int,
+    report: Callable[[], None],
+) -> list[Motion]:
+    """Checked motions of a system, which an error names."""
+    motions = []
+    try:
+        for motion in checked.stream(audio, samples, seed):
+            motions.append(motion)
+            report()
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    return motions
+
+
+def _stems_before(folder: Path) -> tuple[str, ...]:
+    """Stems of the files that an earlier comparison wrote to a folder."""
+    try:
+        found = json.loads((folder / CHECKS).read_text(encoding="utf-8"))
+        return tuple(found["systems"]) if found["format"] == _FORMAT else ()
+    except (OSError, ValueError, KeyError, TypeError):
+        return ()
+
+
+def _note(run: Run, without: Sequence[str]) -> str:
+    """Text below the label of a motion."""
+    return f"{run.config.model}, without {', '.join(without)}" if without else run.config.model
 
 
 def _count(runs: int) -> str:

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.generation.controls import stored_rows
 from a2g_jax.models.base import Condition, Model
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
@@ -30,7 +31,8 @@ def continue_clips(
 ) -> Float[np.ndarray, "N samples frames R D"]:
     """Frames ``first`` to ``last - 1`` of clips, ``samples`` times each.
 
-    Sample k of clip n depends on the clip, the run, the seed, n and k alone.
+    Sample k of clip n depends on the clip, the run, the seed, n and k alone. Controls of the sampling settings are
+    requested from the first frame of every clip on.
 
     Args:
         audio: features as in a corpus, not normalised.
@@ -43,7 +45,8 @@ def continue_clips(
     """
     config, model = run.config, run.config.build()
     normalised = np.asarray(config.statistics["audio"].normalise(audio), np.float32)
-    draw = jax.jit((_autoregressive if model.begin is not None else _whole)(run, model, first, last, audio.shape[1]))
+    make = _autoregressive if model.begin is not None else _whole
+    draw = jax.jit(make(run, model, first, last, audio.shape[1]))
     key = jax.random.key(seed)
     clip_keys = jax.vmap(lambda clip: jax.random.fold_in(key, clip))(jnp.arange(len(audio)))
     keys = jax.vmap(lambda one: jax.vmap(lambda k: jax.random.fold_in(one, k))(jnp.arange(samples)))(clip_keys)
@@ -57,6 +60,12 @@ def continue_clips(
     return np.concatenate(made)
 
 
+def _controls(run: Run, model: Model, frames: int) -> Any:
+    """Requested controls of a clip's frames; None where the model needs none."""
+    rows = stored_rows(run, model.controls, frames)
+    return None if rows is None else jnp.asarray(rows)
+
+
 def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
     """A function that draws the frames one after another, all clips and samples in parallel."""
     history, lookahead = model.seed_frames, model.lookahead
@@ -65,16 +74,17 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
             f"expected frames from {history} to {frames - lookahead} of clips of {frames}; got {first} to {last}"
         )
     condition, begin, proceed, space = model.condition, model.begin, model.proceed, run.config.space
+    controls = _controls(run, model, frames)
     assert condition is not None
     assert begin is not None
     assert proceed is not None
 
     def draw(params, summary, keys, audio, pose):
-        del summary  # its limits of poses are for generation of minutes
-
         def one_clip(keys, audio, pose):
             stop = last + model.overlap
-            given = jax.tree.map(lambda array: array[first:stop], condition(params, {}, Condition(audio)))
+            whole = condition(params, summary, Condition(audio, controls=controls))
+            given = jax.tree.map(lambda array: array[first:stop], whole)
+            # Without the summary, whose limits of poses are for generation of minutes.
             seeds = pose[first - history : first]
 
             def one(key):
@@ -90,8 +100,10 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
 
 def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
     """A function that draws motions of whole clips and takes the frames from them."""
-    del frames
     condition, sample, space = model.condition, model.sample, run.config.space
+    controls = _controls(run, model, frames)
+    if controls is not None:
+        controls = jnp.pad(controls, ((0, -frames % BLOCK), (0, 0)), mode="edge")
     assert condition is not None
     assert sample is not None
 
@@ -101,7 +113,7 @@ def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
         padded = jnp.pad(audio, ((0, 0), (0, -audio.shape[1] % BLOCK), (0, 0)), mode="minimum")
 
         def one_clip(keys, audio):
-            given = condition(params, summary, Condition(audio))
+            given = condition(params, summary, Condition(audio, controls=controls))
             return jax.vmap(lambda key: sample(params, summary, key, given, jnp.int32(0))[first:last])(keys)
 
         return space.valid(jax.vmap(one_clip)(keys, padded))

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Controls
-from a2g_jax.models.control_curves import Curve, parse_curves
+from a2g_jax.models.control_curves import Curve, check_ends, parse_curves
 from a2g_jax.training.run_config import Run
 
 Rows = Float[np.ndarray, "T K"]
@@ -19,9 +19,26 @@ def control_rows(run: Run, lines: Sequence[str], frames: int) -> Rows:
     Columns are those of :func:`controls_of` the run.
 
     Raises:
-        InputError: a run without controls, or a line that does not fit it.
+        InputError: a run without controls, a line that does not fit it, or one with a second past the end.
     """
     controls = controls_of(run)
+    check_ends(lines, frames, run.config.fps)
+    return sampled(parse_curves(lines, controls.names, controls.categories), 0, frames, run.config.fps)
+
+
+def stored_rows(run: Run, controls: Controls | None, frames: int) -> Rows | None:
+    """The ``controls`` of a condition from the run's sampling settings; None where the model needs none.
+
+    Args:
+        controls: of the run's model.
+
+    Raises:
+        InputError: a run that stores too little for them.
+    """
+    lines = getattr(run.config.sampling_settings, "controls", ())
+    if controls is None or (controls.free and not lines):
+        return None
+    check_stored(run, controls)
     return sampled(parse_curves(lines, controls.names, controls.categories), 0, frames, run.config.fps)
 
 

@@ -1,6 +1,6 @@
 """The window loop: motions of any length from a model, window by window."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.controls import check_rows, check_stored, sampled
+from a2g_jax.generation.controls import check_rows, check_stored, stored_rows
 from a2g_jax.models.base import Condition
-from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 
@@ -51,8 +50,9 @@ class Engine:
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
         space, draw, begin, proceed = run.config.space, model.sample, model.begin, model.proceed
-        self._lines = getattr(run.config.sampling_settings, "controls", ())
-        if model.controls is not None and self._lines:
+        #: Requests of the sampling settings.
+        self.lines: Sequence[str] = getattr(run.config.sampling_settings, "controls", ())
+        if model.controls is not None and self.lines:
             check_stored(run, model.controls)
 
         @jax.jit
@@ -115,11 +115,11 @@ class Engine:
             raise InputError(f"the seed poses are {len(seeds)} frames; the run needs {self.model.seed_frames} or more.")
 
     def _with_requests(self, given: Condition) -> Condition:
-        """The condition with what the sampling settings ask for, where it has nothing."""
+        """The condition with the requests of the sampling settings, where it has none."""
         if self.model.requested is None:
             return given
-        asked = self.model.requested(len(given.audio))
-        return given._replace(**{name: value for name, value in asked.items() if getattr(given, name) is None})
+        fields = self.model.requested(len(given.audio))
+        return given._replace(**{name: value for name, value in fields.items() if getattr(given, name) is None})
 
     def _seeds(self, given: Condition) -> Any:
         """The last seed poses, as many as the model takes."""
@@ -166,14 +166,11 @@ class Engine:
     def _controls(self, given: Condition) -> Any:
         """Requested controls, frame by frame; None where there are none and the model needs none."""
         found = self.model.controls
-        if found is None or (found.free and given.controls is None and not self._lines):
-            return None
+        if found is None or given.controls is None:
+            return stored_rows(self.run, found, len(given.audio))
         check_stored(self.run, found)
-        if given.controls is not None:
-            check_rows(np.asarray(given.controls), found)
-            return given.controls
-        curves = parse_curves(self._lines, found.names, found.categories)
-        return sampled(curves, 0, len(given.audio), self.run.config.fps)
+        check_rows(np.asarray(given.controls), found)
+        return given.controls
 
     def _waveform(self, given: Condition, start: int, frames: int) -> Any:
         """Samples of the frames of a window; silence before and after the audio."""

@@ -14,6 +14,7 @@ from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.models.base import Condition
+from a2g_jax.models.control_curves import check_ends
 from a2g_jax.training.run import Run
 
 Audio = Float[np.ndarray, " N"]
@@ -52,6 +53,7 @@ class Generator:
         Raises:
             InputError: such as a timeline that goes on after its end.
         """
+        check_ends(self.engine.lines, self.frames(audio), self.run.config.fps)
         if self.engine.model.requested is not None:
             self.engine.model.requested(self.frames(audio))
 
@@ -85,6 +87,8 @@ class Generator:
 
     def stream(self, audio: Audio, samples: int, seed: int = 0, **given: Any) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one at a time."""
+        if given.get("controls") is None:
+            check_ends(self.engine.lines, self.frames(audio), self.run.config.fps)
         features = speech_features(self.run, audio)
         if "waveform" in self.engine.model.condition_fields:
             given.setdefault("waveform", np.asarray(audio, np.float32))

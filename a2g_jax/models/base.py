@@ -180,8 +180,8 @@ class Model(NamedTuple):
     condition_fields: tuple[str, ...] = ("audio",)
     """Fields of :class:`Condition` that ``condition`` and ``begin`` can use."""
     requested: Callable[[int], dict[str, Any]] | None = None
-    """``requested(frames) -> fields of Condition by name``, with a row for each frame of a whole motion: what the
-    sampling settings ask for, used where the caller gives none."""
+    """``requested(frames) -> fields of Condition by name``, with a row for each frame of a whole motion: the
+    requests of the sampling settings, used where the caller gives none."""
     sample: Callable[..., Array] | None = None
     """``sample(params, summary, key, condition, start) -> pose (T, R, D)``.
 

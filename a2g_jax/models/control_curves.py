@@ -45,7 +45,7 @@ def parse_line(text: str) -> Line:
     """Split ``NAME=VALUE``, or ``NAME=VALUE@SECOND,VALUE@SECOND...`` with commas or spaces.
 
     Raises:
-        InputError: another form, seconds not in ascending order, or a number that is no quantile.
+        InputError: another form, seconds below 0 or not in ascending order, or a number that is no quantile.
     """
     name, equals, points = text.partition("=")
     parts = [part.partition("@") for part in points.replace(",", " ").split()]
@@ -54,11 +54,26 @@ def parse_line(text: str) -> Line:
     seconds = tuple(_number(second, text) if at else 0.0 for _, at, second in parts)
     if any(after <= before for before, after in zip(seconds, seconds[1:], strict=False)):
         raise _refused(text, "expected seconds in ascending order")
+    if seconds[0] < 0:
+        raise _refused(text, f"expected seconds from 0 on; got {seconds[0]:g}")
     values = tuple(value for value, _, _ in parts)
     for value in values:
         if _is_number(value):
             _quantile(value, text)
     return Line(public_name(name.strip()), seconds, values)
+
+
+def check_ends(texts: Sequence[str], frames: int, fps: float) -> None:
+    """Refuse requests that begin after the end of a speech, whose values would hold from its start.
+
+    Raises:
+        InputError: one of them.
+    """
+    for text in texts:
+        second = parse_line(text).seconds[-1]
+        if second > 0 and second >= frames / fps:
+            why = f"second {second:g} is past the end of the speech, which lasts {frames / fps:.2f} s"
+            raise _refused(text, why)
 
 
 def parse_curves(

@@ -101,8 +101,8 @@ def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Names
     for control in subject.names:
         ends = (QUANTILES[0], QUANTILES[-1])
         low, high = (subject.measure([f"{control}={quantile:g}"]) for quantile in ends)
-        asked = np.subtract(*np.quantile(subject.training[control], ends[::-1]))
-        slope = float(np.mean(column(high, control) - column(low, control)) / asked)
+        requested = np.subtract(*np.quantile(subject.training[control], ends[::-1]))
+        slope = float(np.mean(column(high, control) - column(low, control)) / requested)
         gain = min(max(1.0 / max(slope, 1e-6), 1.0), MOST)
         print(f"{name}: {control} responds by {slope:.2f}; gain {gain:.2f}")
         if gain > 1.0:

@@ -1,4 +1,4 @@
-"""Requested and arrived values of every control, and the emotions that a classifier sees."""
+"""Requested and arrived values of every control, and the emotions that a classifier recognises."""
 
 from pathlib import Path
 from typing import Any

@@ -38,18 +38,18 @@ def _response(
     subject: Subject, name: str, free: Sequence[Figures], spread: Float[np.ndarray, " 5"], report: Callable[[], None]
 ) -> dict[str, Any]:
     rng = np.random.default_rng(subject.seed)
-    asked = np.quantile(subject.training[name], QUANTILES)
+    requested = np.quantile(subject.training[name], QUANTILES)
     made = []
     for quantile in QUANTILES:
         made.append(subject.measure([f"{name}={quantile:g}"]))
         report()
-    change = by_speech(column(made[-1], name) - column(made[0], name), subject.draws) / (asked[-1] - asked[0])
+    change = by_speech(column(made[-1], name) - column(made[0], name), subject.draws) / (requested[-1] - requested[0])
     sides = {
         other: float(np.mean(column(made[-1], other) - column(made[0], other)) / spread[PROPERTIES.index(other)])
         for other in PROPERTIES
     }
     return {
-        "requested": asked.tolist(),
+        "requested": requested.tolist(),
         "arrived": [interval(by_speech(column(one, name), subject.draws), rng) for one in made],
         "slope": interval(change, rng),
         "slope_by_draw": change.mean(axis=0).tolist(),

@@ -53,7 +53,7 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
             rows.append(
                 {
                     "percentile": percentile,
-                    "asked": float(np.percentile(training[:, column], percentile)),
+                    "requested": float(np.percentile(training[:, column], percentile)),
                     # One value for each speech: its samples are not independent.
                     **{
                         field: bootstrap_mean(styles[:, :, HandStyle._fields.index(field)].mean(1), rng)._asdict()
@@ -80,7 +80,8 @@ def styles_of(
 
 def _response(name: str, rows: list[dict[str, Any]]) -> dict[str, float]:
     """Rise of the measured value from the first percentile to the last, over that of the requested one."""
-    measured, requested = (rows[-1][name]["mean"] - rows[0][name]["mean"]), (rows[-1]["asked"] - rows[0]["asked"])
+    measured = rows[-1][name]["mean"] - rows[0][name]["mean"]
+    requested = rows[-1]["requested"] - rows[0]["requested"]
     return {"response": measured / requested}
 
 
@@ -94,7 +95,7 @@ def picture(figures: dict[str, Any], path: Path) -> None:
     controls = figures["controls"]
     figure, axes = pyplot.subplots(1, len(controls), figsize=(4 * len(controls), 3.6), squeeze=False)
     for axis, (name, found) in zip(axes[0], controls.items(), strict=True):
-        requested = [row["asked"] for row in found["rows"]]
+        requested = [row["requested"] for row in found["rows"]]
         values = [row[name] for row in found["rows"]]
         means = [value["mean"] for value in values]
         spread = np.abs(np.array([[value["low"], value["high"]] for value in values]).T - means)
@@ -120,7 +121,9 @@ def main() -> None:
     corpus = Corpus.open(options.corpus)
     figures = measure(open_run(options.run), corpus, options.speeches, options.samples, options.seed)
     for name, found in figures["controls"].items():
-        print(name, f"response {found['response']:.2f}", [(row["asked"], row[name]["mean"]) for row in found["rows"]])
+        print(
+            name, f"response {found['response']:.2f}", [(row["requested"], row[name]["mean"]) for row in found["rows"]]
+        )
     folder = results("stylized_flow")
     write_json(folder / "steering.json", {"corpus": name_of(corpus), "seed": options.seed, **figures})
     picture(figures, folder / "steering.png")

@@ -188,7 +188,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
     return {
         "strokes": len(stacked["peak"]),
         "recordings": len(roles),
-        "asked": requested_leads(1_000_000, options.seed),
+        "requested": requested_leads(1_000_000, options.seed),
         "leads": {name: spread(values) for name, values in leads.items()},
         "tolerance": TOLERANCE,
         "shares": shares,
@@ -201,7 +201,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
 
 def tables(result: dict[str, Any]) -> str:
     """Leads, then shares with their null."""
-    lead = result["asked"]
+    lead = result["requested"]
     rows = [["requested (truncated normal)", None, None, lead["mean"], lead["std"], None, None, None]]
     for name, value in result["leads"].items():
         keys = ("n", "missed", "mean", "std", "median", "std_robust", "p5_p95")
@@ -235,7 +235,7 @@ def picture(result: dict[str, Any], path: Path) -> None:
     ):
         counts = np.array(result["histogram"][name], float)
         axes.bar(middle, counts / counts.sum() / width, width, alpha=0.5, label=label)
-    lead = result["asked"]
+    lead = result["requested"]
     inside = (middle >= lead["from"]) & (middle <= lead["to"])
     density = np.exp(-((middle - lead["normal_mean"]) ** 2) / (2 * lead["normal_std"] ** 2)) * inside
     axes.plot(middle, density / density.sum() / width, color="black", lw=1, label="requested")

@@ -377,9 +377,9 @@ def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys)
         load_emotion_judge(tmp_path / "noisy", corpus)
     listens = dataclasses.replace(small, input="audio")
     config = RunConfig.of("emotion_classifier", "tiny", listens, dataclasses.replace(settings, steps=2), corpus)
-    train(config, corpus, tmp_path / "ear", resume=False, progress=False)
+    train(config, corpus, tmp_path / "audio-classifier", resume=False, progress=False)
     with pytest.raises(InputError, match="no classifier of emotions in motion"):
-        load_emotion_judge(tmp_path / "ear", corpus)
+        load_emotion_judge(tmp_path / "audio-classifier", corpus)
 
 
 @pytest.mark.parametrize("view", ["s2g", "ted"])

@@ -34,7 +34,7 @@ def broken(motion, frame=60, joint="L_Elbow"):
 
 @dataclass
 class Scripted:
-    """A sampler whose draws are bad where the script tells so; each has its seed and sample in the root's place."""
+    """A sampler whose draws are bad where ``bad`` returns true; each has its seed and sample in the root's place."""
 
     bad: object
     """Whether the draw of a seed and a sample is bad."""

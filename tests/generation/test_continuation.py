@@ -1,5 +1,7 @@
 """Clips continued from their first poses: conditioned on these, and independent of the other clips."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flows_for_tests import clip, run_of
@@ -39,6 +41,18 @@ def test_it_depends_on_the_poses_before_and_not_on_those_after():
     np.testing.assert_array_equal(continue_clips(run, audio, behind, FIRST, LAST, 1), made)
     np.testing.assert_array_equal(continue_clips(run, audio, early, FIRST, LAST, 1), made)
     assert np.abs(continue_clips(run, audio, before, FIRST, LAST, 1)[:, :, 0] - made[:, :, 0]).max() > 1e-3
+
+
+def test_it_follows_the_controls_of_the_sampling_settings():
+    """They were left out of the condition: runs with style controls moved as those without."""
+    audio, pose = clips(1)
+    run = run_of("exponential", controls=("height",))
+    assert run.config.sampling_settings.controls == ("height=0.1",)
+    high = replace(run, config=run.config.with_sampling(controls=("height=0.1@0.5,0.9@0.6",)))
+    low, made = (continue_clips(each, audio, pose, FIRST, LAST, samples=1, seed=3)[0, 0] for each in (run, high))
+    # Conditioning looks ahead by two frames and averages over a window; long before the change nothing differs.
+    np.testing.assert_allclose(made[:5], low[:5], atol=1e-5)
+    assert np.abs(made[-10:] - low[-10:]).max() > 1e-3
 
 
 def test_frames_without_history_or_lookahead_are_refused():

@@ -16,7 +16,7 @@ from a2g_jax.features.hand_properties import PROPERTIES
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.audio2gestures.model import build
-from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
+from a2g_jax.models.audio2gestures.sampling import SAMPLING_PRESETS, Audio2GesturesSampling
 from a2g_jax.models.audio2gestures.stored import (
     EMOTION,
     HOLD,
@@ -30,6 +30,7 @@ from a2g_jax.models.audio2gestures.stored import (
 )
 from a2g_jax.models.base import Data
 from a2g_jax.talker.skeleton import TALKER_SKELETON
+from a2g_jax.training.run import demo_run
 
 SIZE, STEPS, PARTS, CLIPS = 16, 8, 2, 60
 STORED = replace(
@@ -91,8 +92,8 @@ def test_free_controls_leave_every_code_as_it_is(seed):
 
 
 def test_a_free_stretch_keeps_its_codes_beside_a_requested_one():
-    asked = jnp.where(jnp.arange(4096) < 2048, jnp.nan, 0.9)
-    free, half = drawn(KEY, rows()), drawn(KEY, rows(height=asked))
+    requested = jnp.where(jnp.arange(4096) < 2048, jnp.nan, 0.9)
+    free, half = drawn(KEY, rows()), drawn(KEY, rows(height=requested))
     np.testing.assert_array_equal(half[:128], free[:128])
     assert (half[128:] != free[128:]).any()
 
@@ -100,8 +101,10 @@ def test_a_free_stretch_keeps_its_codes_beside_a_requested_one():
 @pytest.mark.parametrize("name", PROPERTIES)
 def test_a_request_draws_clips_with_that_property(name):
     quantiles = np.quantile(np.asarray(SUMMARY[VALUES], np.float32)[..., PROPERTIES.index(name)], [0.1, 0.5, 0.9])
-    for asked, value in zip((0.1, 0.5, 0.9), quantiles, strict=True):
-        found = np.mean([property_of(drawn(jax.random.key(seed), rows(**{name: asked})), name) for seed in range(4)])
+    for requested, value in zip((0.1, 0.5, 0.9), quantiles, strict=True):
+        found = np.mean(
+            [property_of(drawn(jax.random.key(seed), rows(**{name: requested})), name) for seed in range(4)]
+        )
         np.testing.assert_allclose(found, value, atol=0.25)
 
 
@@ -138,7 +141,7 @@ def test_a_constant_request_keeps_whole_parts_and_a_curve_follows_in_holds():
         return np.flatnonzero(~follows) + 1
 
     still = changes(drawn(KEY, rows(height=0.8)))
-    # At the ends of parts alone: whether the clip still fits is asked again there.
+    # At the ends of parts alone: whether the clip still fits is decided anew there.
     assert np.all(still % (STEPS // PARTS) == 0)
     rising = changes(drawn(KEY, rows(height=jnp.linspace(0.0, 1.0, 4096))))
     assert np.all((rising % (HOLD // SIZE) == 0) | (rising % (STEPS // PARTS) == 0))
@@ -152,6 +155,12 @@ def test_gains_stretch_requests():
     assert property_of(steps, "height").mean() > plain + 0.2
 
 
+def test_gains_are_those_of_a_run_and_not_of_a_preset():
+    """Another run of the preset responds otherwise."""
+    assert not any(preset.control_gains for preset in SAMPLING_PRESETS.values())
+    assert demo_run().config.sampling_settings.control_gains
+
+
 def test_the_summary_holds_the_properties_of_every_part():
     pose = np.tile(MEAN, (3, STORED.clip_frames, 1, 1)).astype(np.float32)
     batch = Batch(jnp.zeros((3, STORED.clip_frames, 5)), jnp.asarray(pose), emotion=jnp.array([0, 1, 1]))
@@ -163,6 +172,20 @@ def test_the_summary_holds_the_properties_of_every_part():
     # A body that stands still in T-pose: no speed, hands at the same height in every part.
     np.testing.assert_array_equal(found[VALUES][..., PROPERTIES.index("energy")], 0)
     assert clip_properties(STORED, DATA, (), batch) == {}
+
+
+def test_recordings_without_an_emotion_are_no_emotion():
+    """An empty name is no category of requests, and its clips are drawn for none of the others."""
+    data = DATA._replace(emotions=("", "calm", "glad"))
+    controls = build(STORED, data).controls
+    assert controls is not None
+    assert controls.categories == {EMOTION: ("calm", "glad")}
+    with pytest.raises(InputError, match="there is no ''.*there are: calm, glad"):
+        build(STORED, data, Audio2GesturesSampling(controls=("emotion=@0",)))
+    pose = jnp.asarray(np.tile(MEAN, (3, STORED.clip_frames, 1, 1)), jnp.float32)
+    batch = Batch(jnp.zeros((3, STORED.clip_frames, 5)), pose, emotion=jnp.array([0, 1, 2]))
+    np.testing.assert_array_equal(clip_properties(STORED, data, NAMES, batch)[LABELS], [-1, 0, 1])
+    assert control_names(STORED, data._replace(emotions=("", "calm"))) == PROPERTIES
 
 
 def test_which_runs_have_which_controls():

@@ -162,6 +162,8 @@ def test_requested_values_are_the_same_in_any_window():
         ({"controls": ("height=",)}, "NAME=VALUE"),
         ({"controls": ("height=0.1@0 0.9",)}, "NAME=VALUE"),
         ({"controls": ("height=0.1@2 0.9@1",)}, "seconds in ascending order"),
+        ({"controls": ("height=0.9@-3",)}, "seconds from 0 on; got -3"),
+        ({"controls": ("height=0.1@-1,0.9@2",)}, "seconds from 0 on; got -1"),
         ({"controls": ("height=0.1", "height=0.2")}, "twice"),
         ({"control_gains": ("height",)}, "--control-gain 'height': expected NAME=FACTOR"),
         ({"control_gains": ("height=0",)}, "a number above 0"),

@@ -40,7 +40,7 @@ class Adapted:
     """Root mean square of the latents that are used, relative to those of the adapted clip."""
 
     def describe(self) -> str:
-        """The changes for the terminal; empty if none is worth a word."""
+        """The changes for the terminal; empty if all are small."""
         parts = [f"turned by {self.turned:.0f} degrees"] if abs(self.turned) >= 15.0 else []
         if self.turning > 0:
             parts.append(f"{self.turning:.0f} degrees of turning about removed")

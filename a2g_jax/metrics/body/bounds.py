@@ -32,9 +32,9 @@ class Margin:
 
 #: Margins over the extremes of a corpus. Speeds: half as fast again, for a single frame that the corpus lacks is no
 #: fault; jerk, whose extremes are rarest, 2.5 times. Angles: 30 degrees of a joint's range, which its movements about
-#: other axes share, and 15 of a hinge. The least bounds are what nobody notices: 180 degrees/s are 6 degrees in a frame
-#: at 30 fps, elbows of many people overextend by 15 degrees, a shift of weight or half a step moves the pelvis at 0.8
-#: m/s, and feet placed by inverse kinematics move by centimetres.
+#: other axes share, and 15 of a hinge. The least bounds are too small to be noticed: 180 degrees/s are 6 degrees
+#: in a frame at 30 fps, elbows of many people overextend by 15 degrees, a shift of weight or half a step moves the
+#: pelvis at 0.8 m/s, and feet placed by inverse kinematics move by centimetres.
 MARGINS: Mapping[str, Margin] = {
     "turn": Margin(times=1.5, least=180.0),
     "range": Margin(plus=30.0, least=40.0),

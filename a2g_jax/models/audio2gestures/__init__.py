@@ -16,7 +16,7 @@ _TRAINING = {
 }
 
 #: The decoder learns how the person moves in the game with the discriminator, whose loss counts more than usual: a
-#: minute of motion is learned by heart otherwise. The encoders stay, and so do the audio's z-scores.
+#: minute of motion is overfitted otherwise. The encoders stay, and so do the audio's z-scores.
 _FINE_TUNING = FineTuning(
     TrainConfig(
         steps=300,

@@ -21,6 +21,7 @@ from a2g_jax.models.audio2gestures.stored import (
     VALUES,
     clip_properties,
     control_names,
+    emotion_names,
     log_weights,
     stored_steps,
 )
@@ -58,7 +59,7 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
     check_objective(config)
     check_sampling(config, sampling)
     names = control_names(config, data)
-    categories = {EMOTION: data.emotions} if EMOTION in names else {}
+    categories = {EMOTION: emotion_names(data)} if EMOTION in names else {}
     check_controls(config, sampling, names, categories)
     weighted = weights(config)
 

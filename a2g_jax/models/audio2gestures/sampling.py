@@ -59,10 +59,6 @@ class Audio2GesturesSampling:
 
 #: Sampling settings by preset; the papers' for presets that are missing.
 SAMPLING_PRESETS: dict[str, Audio2GesturesSampling] = {
-    "tiny": Audio2GesturesSampling(
-        redraw_frames=512,
-        sample_codes=False,
-        control_gains=("energy=1.56", "rate=2.26", "handedness=1.19"),
-    ),
+    "tiny": Audio2GesturesSampling(redraw_frames=512, sample_codes=False),
 }
-"""Gains of controls are those of the shipped weights (``python -m experiments.controls RUN --store``)."""
+"""Without gains of controls, which are measured for each run: ``python -m experiments.controls RUN --store``."""

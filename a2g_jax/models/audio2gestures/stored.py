@@ -39,7 +39,12 @@ def control_names(config: Audio2GesturesConfig, data: Data) -> tuple[str, ...]:
         return ()
     if {"L_Wrist", "R_Wrist"} - set(named_joints(data.space.body.names)):
         return ()
-    return (*PROPERTIES, EMOTION) if len(data.emotions) > 1 else PROPERTIES
+    return (*PROPERTIES, EMOTION) if len(emotion_names(data)) > 1 else PROPERTIES
+
+
+def emotion_names(data: Data) -> tuple[str, ...]:
+    """Emotions that can be requested: those of the corpus, without the empty one of recordings that have no label."""
+    return tuple(name for name in data.emotions if name)
 
 
 def clip_parts(config: Audio2GesturesConfig, data: Data) -> int:
@@ -51,7 +56,7 @@ def clip_parts(config: Audio2GesturesConfig, data: Data) -> int:
 
 def clip_properties(config: Audio2GesturesConfig, data: Data, names: tuple[str, ...], batch: Batch) -> Summary:
     """What is stored of every clip for its controls: properties of its parts (B, P, K), and the number of its emotion
-    (B,)."""
+    (B,), -1 for a clip that has none."""
     if not names:
         return {}
     joints = named_joints(data.space.skeleton.names)
@@ -64,7 +69,9 @@ def clip_properties(config: Audio2GesturesConfig, data: Data, names: tuple[str, 
     found = jax.vmap(lambda piece: hand_properties(piece[:, wrists], piece[:, 0], data.fps))(pieces)
     summary: Summary = {VALUES: found.reshape(clips, parts, -1).astype(jnp.float16)}
     if batch.emotion is not None:
-        summary[LABELS] = batch.emotion.astype(jnp.int8)
+        known = emotion_names(data)
+        numbers = [known.index(name) if name else -1 for name in data.emotions]
+        summary[LABELS] = jnp.array(numbers, jnp.int8)[batch.emotion]
     return summary
 
 

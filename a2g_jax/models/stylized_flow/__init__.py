@@ -7,8 +7,8 @@ from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.stylized_flow.config import PRESETS, TRAINING_PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.sampling import SAMPLING_PRESETS, StylizedFlowSampling
 
-#: The encoder of the audio stays, and steps are few: a minute of speech is learned by heart. Constant channels have no
-#: density, and the others keep theirs.
+#: The encoder of the audio stays, and steps are few, since the flow soon overfits to a minute of speech. Constant
+#: channels have no density, and the others keep theirs.
 _FINE_TUNING = FineTuning(
     replace(
         TRAINING_PRESETS["tiny"],
