@@ -144,10 +144,11 @@ def from_percentiles(text: str) -> str:
 
 def _quantile(value: str, line: str) -> float:
     number = _number(value, line)
-    if 1 < number <= 100:
+    # Between 1 and 2 it is more likely a wish for more than the most.
+    if 2 <= number <= 100:
         raise _refused(line, f"expected quantiles from 0 to 1; for the percentile {number:g} give {number / 100:g}")
     if not 0 <= number <= 1:
-        raise _refused(line, "expected quantiles of the training clips, from 0 to 1")
+        raise _refused(line, "expected quantiles of the training clips, from 0 (the lowest) to 1 (the highest)")
     return number
 
 
