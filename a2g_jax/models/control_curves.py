@@ -148,7 +148,7 @@ def _quantile(value: str, line: str) -> float:
     if 2 <= number <= 100:
         raise _refused(line, f"expected quantiles from 0 to 1; for the percentile {number:g} give {number / 100:g}")
     if not 0 <= number <= 1:
-        raise _refused(line, "expected quantiles of the training clips, from 0 (the lowest) to 1 (the highest)")
+        raise _refused(line, "expected quantiles of the training clips, from 0 to 1, the highest of all")
     return number
 
 
