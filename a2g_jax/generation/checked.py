@@ -145,13 +145,24 @@ class Checked:
         return kept.motion, SampleReport(sample, draws, kept.findings, before, kept.eased)
 
     def _eased(self, motion: Motion, findings: tuple[BodyFinding, ...]) -> "_Draw":
-        """The motion with its joints eased back, if that leaves fewer frames outside."""
+        """The motion with its joints eased back, where that leaves fewer frames outside and does no harm."""
         drawn = _Draw(motion, findings)
         if not findings or findings[0].figure == "finite":
             return drawn
-        other = ease(motion, findings, self.bounds, self.stretches)
+        eased = self._ease(drawn, findings)
+        if eased is not None:
+            return eased
+        # A joint whose correction does harm elsewhere must not keep the others from theirs.
+        for joint in dict.fromkeys(one.joint for one in findings):
+            drawn = self._ease(drawn, [one for one in findings if one.joint == joint]) or drawn
+        return drawn
+
+    def _ease(self, drawn: "_Draw", findings: Sequence[BodyFinding]) -> "_Draw | None":
+        """A draw with the joints of findings eased back; None if that leaves no fewer frames outside, or if any figure
+        of any joint is then further outside than before."""
+        other = ease(drawn.motion, findings, self.bounds, self.stretches)
         eased = _Draw(other, check_motion(other, self.bounds, self.stretches), eased=True)
-        return eased if eased.badness < drawn.badness else drawn
+        return eased if eased.badness < drawn.badness and not _worse(eased.findings, drawn.findings) else None
 
     def _helps(self, findings: Sequence[BodyFinding]) -> bool:
         """Whether another draw can help: the motion of a pinned clip is the same in each."""
@@ -190,6 +201,20 @@ class _Draw:
 def redrawn_seed(seed: int, sample: int, attempt: int) -> int:
     """Seed of another draw of a sample: a hash of seed, sample and number of the attempt, from 0 to 2**31 - 1."""
     return int(np.random.SeedSequence([seed, sample, attempt]).generate_state(1)[0] >> 1)
+
+
+def _worse(after: Sequence[BodyFinding], before: Sequence[BodyFinding]) -> bool:
+    """Whether a finding has no earlier one of its figure and joint at its frames that was as far outside."""
+    return not all(
+        any(
+            (old.figure, old.joint) == (new.figure, new.joint)
+            and old.first < new.stop
+            and new.first < old.stop
+            and new.value - new.bound <= old.value - old.bound + 1e-3
+            for old in before
+        )
+        for new in after
+    )
 
 
 def _same(one: Motion, other: Motion) -> bool:
