@@ -181,6 +181,20 @@ def test_a_sample_depends_on_its_number_alone(run, speech, take):
     assert len(pinned.reports) == 1
 
 
+def test_bounds_of_pins_are_those_of_the_clip_as_it_is_performed(run, speech, take):
+    """The root and the height of the clip's file, which are not performed, widen no bound."""
+    clip = take.clip(100, 160)
+    root = np.array(clip.root)
+    root[:, 1] += np.where(np.arange(60) % 20 < 10, -0.6, 0.4)
+    root[:, 0] += 0.2 * np.arange(60)
+    (high,), (own,) = (
+        PinnedClips(run, Generator(run), (pin_of(motion, run, "clip", 3.0),)).stretches
+        for motion in (replace(clip, root=root), clip)
+    )
+    for name, values in own.bounds.high.items():
+        np.testing.assert_allclose(high.bounds.high[name], values, rtol=1e-5)
+
+
 def test_a_crouch_lowers_the_body_over_standing_feet(run, plain, take):
     clip = take.clip(0, 60)
     rotations = np.array(clip.rotations)
