@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.metrics.body.bounds import BodyBounds
 from a2g_jax.metrics.body.check import BodyFinding, Stretch
-from a2g_jax.metrics.body.figures import HINGES
 
 #: Degrees inside a bound from which angles are compressed, and the degrees inside that none passes.
 _BEGIN, _END = 17.0, 2.0
@@ -83,7 +82,7 @@ def _within_flexion(
     motion: Motion, role: str, bounds: BodyBounds, weight: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "T 3 3"]:
     """Rotations of a hinge turned about its axis, so that its flexion lies within the bounds where the weight is 1."""
-    number, joint = HINGES.index(role), bounds.reference.joints[role]
+    number, joint = bounds.reference.hinges.index(role), bounds.reference.joints[role]
     flexion = bounds.reference.figures(motion)["bend"][:, number].astype(np.float64)
     wanted = _compressed(flexion, bounds.high["bend"][number])
     wanted = -_compressed(-wanted, bounds.high["backwards"][number])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.generation.checked import Checked
-from a2g_jax.generation.drafts import Draft
+from a2g_jax.generation.drafts import Draft, recorded
 from a2g_jax.generation.ease import _compressed, ease
 from a2g_jax.metrics.body.bounds import bounds_of, extremes
 from a2g_jax.metrics.body.check import Stretch, check_motion
@@ -142,6 +142,9 @@ def test_a_bad_sample_is_eased_before_it_is_drawn_again(toy_run_config):
 
         def __init__(self):
             self.recorded = []
+
+        def stream(self, audio, samples, seed=0):
+            return recorded(self.drafts(audio, samples, seed))
 
         def drafts(self, audio, samples, seed=0):
             self.draws += 1
