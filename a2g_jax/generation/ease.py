@@ -40,8 +40,8 @@ def ease(
     reference = bounds.reference
     roles = {reference.skeleton.names[joint]: role for role, joint in reference.joints.items()}
     fixed = np.zeros(motion.frames, bool)
-    for one in stretches:
-        fixed[max(one.first, 0) : max(one.stop, 0)] = True
+    for stretch in stretches:
+        fixed[max(stretch.first, 0) : max(stretch.stop, 0)] = True
     found: dict[tuple[str, str], Bool[np.ndarray, " T"]] = {}
     for one in findings:
         role, figure = roles.get(one.joint), "range" if one.figure == "range" else "bend"
