@@ -1,13 +1,14 @@
 """Generation that checks every motion, and eases or draws it again where a body could not do it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from a2g_jax.errors import InputError
+from a2g_jax.generation.drafts import Draft, drafts_of
 from a2g_jax.generation.ease import ease
 from a2g_jax.generation.generator import Audio, Sampler
 from a2g_jax.geometry.motion import Motion
@@ -66,8 +67,8 @@ class Checked:
 
     The wrapped sampler may have these attributes: ``stretches``, frames with bounds of their own
     (:class:`~a2g_jax.metrics.body.check.Stretch`), such as those of pinned clips; ``varies``, false if another seed
-    gives the same motion; ``reports``, a list with an entry for each sample of the current stream, in which the entry
-    of a sample that was drawn again is replaced.
+    gives the same motion. The reports of one that yields drafts (:class:`~a2g_jax.generation.drafts.Drafting`) are on
+    the motions that are kept.
     """
 
     run: Run
@@ -94,15 +95,16 @@ class Checked:
             InputError: a motion holds NaN after all draws, or with ``strict``, is outside the bounds.
         """
         self.reports.clear()
-        for sample, motion in enumerate(self.sampler.stream(audio, samples, seed)):
-            kept, report = self._check(audio, seed, sample, motion)
+        for sample, draft in enumerate(drafts_of(self.sampler, audio, samples, seed)):
+            kept, report = self._check(audio, seed, sample, draft)
             self.reports.append(report)
             if report.findings and (self.strict or report.findings[0].figure == "finite"):
                 raise InputError(
                     f"sample {sample}: a body cannot do it, after {_times(report.draws)}: {report.findings[0]}; use"
                     f" another --seed or speech{', or leave --strict out' if self.strict else ''}."
                 )
-            yield kept
+            kept.record(sample, kept.motion)
+            yield kept.motion
 
     def to_json(self) -> dict[str, Any]:
         """Bounds, and the reports so far."""
@@ -128,30 +130,41 @@ class Checked:
         first = f"checked: {good} of {len(self.reports)} within the bounds of {self.bounds.source}{note}"
         return [first, *(line for report in self.reports for line in report.lines())]
 
-    def _check(self, audio: Audio, seed: int, sample: int, motion: Motion) -> tuple[Motion, SampleReport]:
-        first = check_motion(motion, self.bounds, self.stretches)
-        kept, draws = self._eased(motion, first), 1
+    def _check(self, audio: Audio, seed: int, sample: int, draft: Draft) -> tuple[Draft, SampleReport]:
+        first = check_motion(draft.motion, self.bounds, self.stretches)
+        kept, draws = self._eased(draft, first), 1
         while kept.findings and draws <= REDRAWS and self._helps(kept.findings):
-            again, entry = self._again(audio, redrawn_seed(seed, sample, draws))
+            (again,) = drafts_of(self.sampler, audio, 1, redrawn_seed(seed, sample, draws))
             draws += 1
-            if _same(again, motion):
+            if _same(again.motion, draft.motion):
                 break
-            other = self._eased(again, check_motion(again, self.bounds, self.stretches))
+            other = self._eased(again, check_motion(again.motion, self.bounds, self.stretches))
             if other.badness < kept.badness:
                 kept = other
-                if entry is not None:
-                    self.sampler.reports[sample] = entry  # type: ignore[attr-defined]
-        before = first if kept.motion is not motion else ()
-        return kept.motion, SampleReport(sample, draws, kept.findings, before, kept.eased)
+        before = first if kept.draft is not draft else ()
+        return kept.draft, SampleReport(sample, draws, kept.findings, before, kept.eased)
 
-    def _eased(self, motion: Motion, findings: tuple[BodyFinding, ...]) -> "_Draw":
-        """The motion with its joints eased back, if that leaves fewer frames outside."""
-        drawn = _Draw(motion, findings)
+    def _eased(self, draft: Draft, findings: tuple[BodyFinding, ...]) -> "_Draw":
+        """The motion with its joints eased back, where that leaves fewer frames outside and does no harm."""
+        drawn = _Draw(draft, findings)
         if not findings or findings[0].figure == "finite":
             return drawn
-        other = ease(motion, findings, self.bounds, self.stretches)
-        eased = _Draw(other, check_motion(other, self.bounds, self.stretches), eased=True)
-        return eased if eased.badness < drawn.badness else drawn
+        eased = self._ease(drawn, findings)
+        if eased is not None:
+            return eased
+        # A joint whose correction does harm elsewhere must not keep the others from theirs.
+        for joint in dict.fromkeys(one.joint for one in findings):
+            drawn = self._ease(drawn, [one for one in findings if one.joint == joint]) or drawn
+        return drawn
+
+    def _ease(self, drawn: "_Draw", findings: Sequence[BodyFinding]) -> "_Draw | None":
+        """A draw with the joints of findings eased back; None if that leaves no fewer frames of joints outside, or if
+        any figure of any joint is then further outside than before."""
+        other = ease(drawn.draft.motion, findings, self.bounds, self.stretches)
+        found = check_motion(other, self.bounds, self.stretches)
+        eased = _Draw(replace(drawn.draft, motion=other), found, eased=True)
+        fewer = sum(one.frames for one in found) < sum(one.frames for one in drawn.findings)
+        return eased if fewer and not _worse(found, drawn.findings) else None
 
     def _helps(self, findings: Sequence[BodyFinding]) -> bool:
         """Whether another draw can help: the motion of a pinned clip is the same in each."""
@@ -160,23 +173,12 @@ class Checked:
         spans = [(one.first, one.stop) for one in self.stretches]
         return not all(any(first <= one.first and one.stop <= stop for first, stop in spans) for one in findings)
 
-    def _again(self, audio: Audio, seed: int) -> tuple[Motion, Any]:
-        """Another draw, and the wrapped sampler's report on it; its list of reports stays as it is."""
-        reports = getattr(self.sampler, "reports", None)
-        before = None if reports is None else list(reports)
-        (motion,) = self.sampler.stream(audio, 1, seed)
-        if reports is None:
-            return motion, None
-        entry = reports[0] if reports else None
-        reports[:] = before or []
-        return motion, entry
-
 
 @dataclass(frozen=True, eq=False)
 class _Draw:
-    """A motion with the findings on it."""
+    """A draft with the findings on its motion."""
 
-    motion: Motion
+    draft: Draft
     findings: tuple[BodyFinding, ...]
     eased: bool = False
 
@@ -184,12 +186,26 @@ class _Draw:
     def badness(self) -> tuple[bool, int]:
         """NaN is worst, then the number of frames outside."""
         broken = any(one.figure == "finite" for one in self.findings)
-        return broken, frames_outside(self.findings, self.motion.frames)
+        return broken, frames_outside(self.findings, self.draft.motion.frames)
 
 
 def redrawn_seed(seed: int, sample: int, attempt: int) -> int:
     """Seed of another draw of a sample: a hash of seed, sample and number of the attempt, from 0 to 2**31 - 1."""
     return int(np.random.SeedSequence([seed, sample, attempt]).generate_state(1)[0] >> 1)
+
+
+def _worse(after: Sequence[BodyFinding], before: Sequence[BodyFinding]) -> bool:
+    """Whether a finding has no earlier one of its figure and joint at its frames that was as far outside."""
+    return not all(
+        any(
+            (old.figure, old.joint) == (new.figure, new.joint)
+            and old.first < new.stop
+            and new.first < old.stop
+            and new.value - new.bound <= old.value - old.bound + 1e-3
+            for old in before
+        )
+        for new in after
+    )
 
 
 def _same(one: Motion, other: Motion) -> bool:

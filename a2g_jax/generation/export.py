@@ -1,7 +1,7 @@
 """Generated motions as files, and a page that plays them."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -48,14 +48,14 @@ def export(
         title: name of the speech, for the page's heading.
         label: description of the sampler, for the page's subtitle.
         lanes: further tracks of the page's timeline.
-        report: called with the number of samples done.
+        report: called with the number of samples done: with ``strict`` once they are checked, else once written.
 
     Returns:
         How many files of each format were written.
 
     Raises:
         InputError: a folder that cannot be used, audio shorter than a frame, too large a page, or a motion that is
-            refused.
+            refused. Without ``strict``, those before it stay in the folder, and ``checks.json`` has the findings.
     """
     if PAGE in formats:
         check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
@@ -63,14 +63,18 @@ def export(
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
     if checked.strict:
         make_folder(out)  # a folder that cannot be used is refused before any work
-        motions = list(motions)
-    files, figures = MotionFiles(out, "sample", formats, _REPORTS), []
-    for number, motion in enumerate(motions):
-        files.write(number, motion)
-        if PAGE in formats:
-            figures.append(checked_figure(motion, f"sample {number}", checked.reports[number].findings))
-        report(number + 1)
-    write_json(files.folder / "checks.json", checked.to_json())
+        motions = list(_counted(motions, report))
+    files, figures, done = MotionFiles(out, "sample", formats, _REPORTS), [], 0
+    try:
+        for done, motion in enumerate(motions, start=1):
+            files.write(done - 1, motion)
+            if PAGE in formats:
+                figures.append(checked_figure(motion, f"sample {done - 1}", checked.reports[done - 1].findings))
+            if not checked.strict:
+                report(done)
+    finally:
+        if done:  # motions before one that is refused stay, with the findings on all
+            write_json(files.folder / "checks.json", checked.to_json())
     if figures:
         write_page(
             files.folder / "index.html",
@@ -84,6 +88,13 @@ def export(
             lanes=lanes,
         )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
+
+
+def _counted(motions: Iterable[Motion], report: Callable[[int], None]) -> Iterator[Motion]:
+    """The motions, with a call after each."""
+    for done, motion in enumerate(motions, start=1):
+        report(done)
+        yield motion
 
 
 def checked_figure(motion: Motion, label: str, findings: Sequence[BodyFinding], note: str = "") -> Figure:

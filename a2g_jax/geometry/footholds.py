@@ -182,8 +182,10 @@ def _reach(
     distance = np.linalg.norm(target - hip, axis=-1)
     upper, lower = _bones(motion, leg)
     distance = np.clip(distance, abs(upper - lower) + 1e-4, _REACH * (upper + lower))
-    bend = np.zeros(len(hip))
-    bent = shin
+    # A knee that is bent backwards is bent as far forwards first: from there on, flexion has no sign.
+    signed = np.arctan2(np.sum(np.cross(thigh, shin) * axis, axis=-1), np.sum(thigh * shin, axis=-1))
+    bend = np.where(signed < 0.0, -2.0 * signed, 0.0)
+    bent = Rotation.from_rotvec(bend[:, None] * axis).apply(shin)
     for _ in range(_ITERATIONS):
         # The knee's flexion that gives this distance, by the law of cosines, less that of the shin as it is.
         now = np.linalg.norm(thigh + bent, axis=-1)
@@ -211,11 +213,15 @@ def _bend_axis(
     shin: Float[np.ndarray, "T 3"],
 ) -> Float[np.ndarray, "3"]:
     """Axis about which the knee bends, in the frame of the hip joint: a knee that is nearly stretched has none of its
-    own, so it is that of the whole motion, or across the foot for a leg that never bends."""
-    local = np.einsum("tji,tj->ti", world[:, leg.hip], np.cross(thigh, shin)).mean(axis=0)
+    own, so it is that of the whole motion, or across the foot for a leg that never bends. Frames in which the knee is
+    bent backwards, as those of some recordings are, do not count: it would be bent further that way."""
+    toe = world[:, leg.ankle] @ np.asarray(motion.skeleton.offsets, np.float64)[leg.toe]
+    across = np.cross(toe, thigh)
+    cross = np.cross(thigh, shin)
+    forwards = np.sum(across * cross, axis=-1, keepdims=True) >= 0.0
+    local = np.einsum("tji,tj->ti", world[:, leg.hip], np.where(forwards, cross, 0.0)).mean(axis=0)
     if np.linalg.norm(local) < 1e-3 * np.prod(_bones(motion, leg)):
-        toe = world[0, leg.ankle] @ np.asarray(motion.skeleton.offsets, np.float64)[leg.toe]
-        local = world[0, leg.hip].T @ np.cross(toe, thigh[0])
+        local = world[0, leg.hip].T @ across[0]
     length = np.linalg.norm(local)
     return local / length if length > 0 else np.array([1.0, 0.0, 0.0])
 

@@ -9,12 +9,15 @@ import pytest
 from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.checked import REDRAWS, Checked, redrawn_seed
+from a2g_jax.generation.drafts import Draft, enter, recorded
 from a2g_jax.generation.export import export
+from a2g_jax.generation.pins.pinned import PinnedClips
+from a2g_jax.generation.pins.request import pin_of
 from a2g_jax.io.audio import write_audio
 from a2g_jax.metrics.body.check import Stretch, check_motion
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.body_extremes import corpus_extremes
-from a2g_jax.training.run import Run, load_run, save_run
+from a2g_jax.training.run import Run, demo_run, load_run, save_run
 
 SPEECH = talk(6.0, 21).audio
 SOUND = talk(6.0, 21).motion
@@ -40,16 +43,23 @@ class Scripted:
     """Whether the draw of a seed and a sample is bad."""
     drawn: list = field(default_factory=list)
     reports: list = field(default_factory=list)
+    kept: list = field(default_factory=list)
     ignores_seed: bool = False
 
     def stream(self, audio, samples, seed=0):
-        self.reports.clear()
+        return recorded(self.drafts(audio, samples, seed))
+
+    def drafts(self, audio, samples, seed=0):
         for sample in range(samples):
             self.drawn.append((seed, sample))
             mark = 0 if self.ignores_seed else 1e-4 * (seed % 100) + 1e-6 * sample
             motion = replace(SOUND, root=SOUND.root + np.float32(mark))
-            self.reports.append((seed, sample))
-            yield broken(motion) if self.bad(seed, sample) else motion
+            record = lambda number, kept, about=(seed, sample): self._record(number, kept, about)  # noqa: E731
+            yield Draft(broken(motion) if self.bad(seed, sample) else motion, record)
+
+    def _record(self, number, kept, about):
+        enter(self.reports, number, about)
+        enter(self.kept, number, kept)
 
 
 def test_good_samples_stay_as_they_are(run):
@@ -78,6 +88,23 @@ def test_a_bad_sample_is_drawn_again(run):
     alone = list(Checked(run, Scripted(bad)).stream(SPEECH, 2, 7))
     for one, other in zip(alone, motions, strict=False):
         np.testing.assert_array_equal(one.root, other.root)
+
+
+def test_reports_of_nested_samplers(toy_run_config):
+    """Draws in place of a bad sample change no report on the others, of whichever sampler; each is on what is kept."""
+    run = demo_run()
+    pin = pin_of(talk(20.0, 77, speaker="felix").motion.clip(100, 130), run, "clip", 3.0)
+    inner = Scripted(lambda seed, sample: (seed, sample) == (7, 1))
+    pinned = PinnedClips(run, inner, (pin,), limit=860.0)
+    checked = Checked(run, pinned)
+    motions = list(checked.stream(SPEECH, 3, 7))
+    assert [report.draws for report in checked.reports] == [1, 2, 1]
+    assert inner.reports == [(7, 0), (redrawn_seed(7, 1, 1), 0), (7, 2)]
+    assert [kept is motion for kept, motion in zip(inner.kept, motions, strict=True)] == [True] * 3
+    assert len(pinned.reports) == 3
+    one = Checked(run, PinnedClips(run, Scripted(inner.bad), (pin,), limit=860.0))
+    list(one.stream(SPEECH, 2, 7))
+    assert one.sampler.reports == pinned.reports[:2]
 
 
 def test_a_sample_that_stays_bad_is_reported(run, tmp_path):
@@ -142,6 +169,36 @@ def test_nan_is_never_written(run, tmp_path):
     with pytest.raises(InputError, match="sample 0: .*Pelvis is not a number; use another --seed or speech."):
         export(run, Broken(), SPEECH, tmp_path, samples=1, seed=0, formats=("npz",), title="")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_nan_after_good_samples_leaves_them_with_their_checks(run, tmp_path):
+    """With ``strict``, none; progress is that of the check then."""
+
+    class Broken:
+        varies = False
+
+        def stream(self, audio, samples, seed=0):
+            yield SOUND
+            yield SOUND
+            yield replace(SOUND, root=np.full_like(SOUND.root, np.nan))
+
+    done = []
+    kwargs = {"samples": 3, "seed": 0, "formats": ("npz",), "title": "", "report": done.append}
+    with pytest.raises(InputError, match="sample 2: .*is not a number"):
+        export(run, Broken(), SPEECH, tmp_path / "loose", **kwargs)
+    assert {path.name for path in (tmp_path / "loose").iterdir()} == {
+        "sample_00.npz",
+        "sample_01.npz",
+        "checks.json",
+    }
+    rows = json.loads((tmp_path / "loose" / "checks.json").read_text())["samples"]
+    assert [len(row["findings"]) for row in rows] == [0, 0, 1]
+    assert done == [1, 2]
+    done.clear()
+    with pytest.raises(InputError, match="sample 2: .*is not a number"):
+        export(run, Checked(run, Broken(), strict=True), SPEECH, tmp_path / "strict", **kwargs)
+    assert list((tmp_path / "strict").iterdir()) == []
+    assert done == [1, 2]
 
 
 def test_seeds_of_draws_are_distinct():

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.generation.checked import Checked
+from a2g_jax.generation.drafts import Draft, recorded
 from a2g_jax.generation.ease import _compressed, ease
 from a2g_jax.metrics.body.bounds import bounds_of, extremes
 from a2g_jax.metrics.body.check import Stretch, check_motion
@@ -62,8 +63,63 @@ def test_legs_and_stretches_stay():
     assert any(one.joint == "L_Knee" for one in findings)
     np.testing.assert_array_equal(ease(knee, findings, BOUNDS).rotations, knee.rotations)
     head = swung("Head", (0.0, 1.0, 0.0), 100.0)
-    eased = ease(head, check_motion(head, BOUNDS), BOUNDS, [Stretch(200, 260, BOUNDS)])
-    np.testing.assert_array_equal(eased.rotations[200:260], head.rotations[200:260])
+    joint = NAMES.index("Head")
+    turns = REFERENCE.figures(head)["turn"][:, joint]
+    for first, stop in ((200, 260), (215, 245), (100, 222), (238, 300)):
+        findings = check_motion(head, BOUNDS)
+        eased = ease(head, findings, BOUNDS, [Stretch(first, stop, BOUNDS)])
+        np.testing.assert_array_equal(eased.rotations[first:stop], head.rotations[first:stop])
+        # No jump at its borders, where the head is turned too far.
+        after = REFERENCE.figures(eased)["turn"][:, joint]
+        assert after.max() < 2.0 * turns.max()
+        assert np.abs(np.diff(after)).max() < 100.0
+
+
+def test_frames_far_from_findings_stay():
+    """Also those that are near the bounds."""
+    bad = swung("Head", (0.0, 1.0, 0.0), 100.0)
+    findings = [one for one in check_motion(bad, BOUNDS) if one.figure == "range"]
+    eased = ease(bad, findings, BOUNDS)
+    first, stop = min(one.first for one in findings), max(one.stop for one in findings)
+    for rows in (slice(0, first - 24), slice(stop + 24, None)):
+        np.testing.assert_array_equal(eased.rotations[rows], bad.rotations[rows])
+    twice = replace(bad, rotations=np.concatenate([bad.rotations, bad.rotations]), root=np.concatenate([bad.root] * 2))
+    eased = ease(twice, findings, BOUNDS)
+    np.testing.assert_array_equal(eased.rotations[MOTION.frames :], bad.rotations)
+
+
+def test_easing_that_does_harm_is_refused(toy_run_config, monkeypatch):
+    """One frame of a fast turn is worse than the many that are turned a little too far; other joints are eased."""
+    from a2g_jax.training.run import Run
+
+    head, both = swung("Head", (0.0, 1.0, 0.0), 100.0), np.array(swung("R_Elbow", -REFERENCE.axes[1], 120.0).rotations)
+    both[:, NAMES.index("Head")] = head.rotations[:, NAMES.index("Head")]
+    bad = replace(head, rotations=both)
+
+    def jumping(motion, findings, bounds, stretches):
+        eased = ease(motion, findings, bounds)
+        rotations = np.array(eased.rotations)
+        rotations[229:231, NAMES.index("Head")] = motion.rotations[229:231, NAMES.index("Head")]
+        return replace(eased, rotations=rotations)
+
+    monkeypatch.setattr("a2g_jax.generation.checked.ease", jumping)
+
+    class Same:
+        varies = False
+
+        def stream(self, audio, samples, seed=0):
+            yield bad
+
+    run = Run(toy_run_config(), {}, {}, 0)
+    run.config.__dict__["body_bounds"] = BOUNDS
+    checked = Checked(run, Same())
+    (kept,) = checked.stream(np.zeros(16000, np.float32), 1)
+    found, before = (check_motion(one, BOUNDS) for one in (kept, bad))
+    turns = lambda findings: [one for one in findings if (one.figure, one.joint) == ("turn", "Head")]  # noqa: E731
+    assert len(turns(found)) == len(turns(before)) == 0
+    assert any(one.joint == "R_Elbow" for one in before)
+    assert not any(one.joint == "R_Elbow" for one in found)
+    assert {one.joint for one in found} == {"Head"}
 
 
 @settings(max_examples=50, deadline=None)
@@ -84,9 +140,16 @@ def test_a_bad_sample_is_eased_before_it_is_drawn_again(toy_run_config):
     class Bent:
         draws = 0
 
+        def __init__(self):
+            self.recorded = []
+
         def stream(self, audio, samples, seed=0):
+            return recorded(self.drafts(audio, samples, seed))
+
+        def drafts(self, audio, samples, seed=0):
             self.draws += 1
-            yield swung("R_Elbow", -REFERENCE.axes[1], 120.0)
+            record = lambda number, motion: self.recorded.append((number, motion))  # noqa: E731
+            yield Draft(swung("R_Elbow", -REFERENCE.axes[1], 120.0), record)
 
     run, sampler = Run(toy_run_config(), {}, {}, 0), Bent()
     run.config.__dict__["body_bounds"] = BOUNDS  # a cached property
@@ -96,6 +159,7 @@ def test_a_bad_sample_is_eased_before_it_is_drawn_again(toy_run_config):
     assert check_motion(motion, BOUNDS) == ()
     (report,) = checked.reports
     assert (report.eased, report.draws, report.findings) == (True, 1, ())
+    assert sampler.recorded == [(0, motion)]
     assert report.before[0].figure == "backwards"
     first, second = checked.lines()
     assert first == "checked: 1 of 1 within the bounds of the training split with margins (1 eased back)"

@@ -181,6 +181,20 @@ def test_a_sample_depends_on_its_number_alone(run, speech, take):
     assert len(pinned.reports) == 1
 
 
+def test_bounds_of_pins_are_those_of_the_clip_as_it_is_performed(run, speech, take):
+    """The root and the height of the clip's file, which are not performed, widen no bound."""
+    clip = take.clip(100, 160)
+    root = np.array(clip.root)
+    root[:, 1] += np.where(np.arange(60) % 20 < 10, -0.6, 0.4)
+    root[:, 0] += 0.2 * np.arange(60)
+    (high,), (own,) = (
+        PinnedClips(run, Generator(run), (pin_of(motion, run, "clip", 3.0),)).stretches
+        for motion in (replace(clip, root=root), clip)
+    )
+    for name, values in own.bounds.high.items():
+        np.testing.assert_allclose(high.bounds.high[name], values, rtol=1e-5)
+
+
 def test_a_crouch_lowers_the_body_over_standing_feet(run, plain, take):
     clip = take.clip(0, 60)
     rotations = np.array(clip.rotations)
@@ -193,6 +207,47 @@ def test_a_crouch_lowers_the_body_over_standing_feet(run, plain, take):
     down = plain.root[placed.pin.first : placed.pin.stop, 1] - motion.root[placed.pin.first : placed.pin.stop, 1]
     assert 0.1 < np.median(down) < 0.4
     assert feet_slide(body_of(motion)) < 5.0
+
+
+def leg_figures(run, motion):
+    """Fastest turn of hips, knees and ankles (degrees/s), and the most that knees are bent backwards (degrees)."""
+    reference = run.config.body_bounds.reference
+    figures = reference.figures(motion)
+    legs = [reference.joints[f"{side}_{part}"] for side in "LR" for part in ("Hip", "Knee", "Ankle")]
+    return figures["turn"][:, legs].max(), figures["backwards"][:, 2:].max()
+
+
+def test_legs_take_their_time_into_a_crouch(run, plain, take):
+    """The hands of a clip that only crouches would allow the shortest transition, in which knees turn by 90 degrees."""
+    clip = replace(plain.clip(80, 140), root=plain.root[80:140])
+    rotations = np.array(clip.rotations)
+    for joint, angle in (("Hip", -45.0), ("Knee", 90.0), ("Ankle", -45.0)):
+        for side in "LR":
+            index = TALKER_SKELETON.names.index(f"{side}_{joint}")
+            rotations[:, index] = rotations[:, index] @ Rotation.from_euler("x", angle, degrees=True).as_matrix()
+    pin = pin_of(replace(clip, rotations=rotations), run, "crouch", 80 / 30)
+    motion, (placed,) = put(plain, run, pin)
+    assert leg_figures(run, motion)[0] < 180.0
+    assert max(placed.ends) < 60
+    # A length that is requested is taken as it is.
+    motion, (placed,) = put(plain, run, pin, length=0.3)
+    assert leg_figures(run, motion)[0] > 300.0
+
+
+def test_knees_bend_forwards_around_a_clip_whose_knees_are_bent_backwards(run, plain):
+    """As by a few degrees in recordings; a knee that reaches for a foothold must not bend further that way."""
+    reference = run.config.body_bounds.reference
+    clip = plain.clip(60, 160)
+    rotations = np.array(clip.rotations)
+    flexion = reference.figures(clip)["bend"]
+    for number in (2, 3):
+        knee = reference.joints[reference.hinges[number]]
+        turn = np.radians(-8.0 - flexion[:, number])[:, None] * reference.axes[number]
+        rotations[:, knee] = (Rotation.from_rotvec(turn) * Rotation.from_matrix(rotations[:, knee])).as_matrix()
+    motion, _ = put(plain, run, pin_of(replace(clip, rotations=rotations), run, "clip", 2.0))
+    turn, backwards = leg_figures(run, motion)
+    assert turn < 180.0
+    assert backwards < 10.0
 
 
 def test_a_flip_is_replaced_and_named_and_a_motion_of_flips_is_refused(run, take):

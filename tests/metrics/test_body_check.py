@@ -220,3 +220,46 @@ def test_other_bodies():
     assert check_motion(replace(HELD_OUT, rotations=HELD_OUT.rotations[:0], root=HELD_OUT.root[:0]), BOUNDS) == ()
     for frames in (1, 2, 3):
         assert check_motion(HELD_OUT.clip(0, frames), BOUNDS) == ()
+
+
+def upper_body():
+    """Talk on a skeleton without legs, with names of the 47 joints of work on BEAT."""
+    names = {"Pelvis": "Hips", "Spine1": "Spine", "Spine2": "Spine2", "Neck": "Neck", "Head": "Head"}
+    for side, word in (("L", "L"), ("R", "R")):
+        names |= {f"{side}_Collar": f"{word}Shoulder", f"{side}_Shoulder": f"{word}Arm"}
+        names |= {f"{side}_Elbow": f"{word}Arm1", f"{side}_Wrist": f"{word}Hand"}
+    motion = TAKES[0]
+    kept = [NAMES.index(role) for role in sorted(names, key=NAMES.index)]
+    parents = []
+    for joint in kept:
+        above = motion.skeleton.parents[joint]
+        while above not in kept and above != -1:
+            above = motion.skeleton.parents[above]
+        parents.append(kept.index(above) if above in kept else -1)
+    skeleton = Skeleton(
+        np.asarray(motion.skeleton.offsets)[kept], tuple(names[NAMES[joint]] for joint in kept), tuple(parents)
+    )
+    return Motion(np.asarray(motion.rotations)[:, kept], motion.root, skeleton, motion.fps)
+
+
+def test_arms_of_an_upper_body():
+    """Elbows and wrists are checked without legs and with two spines; figures of knees and feet are left out."""
+    motion = upper_body()
+    reference = Reference(motion.skeleton, mean_pose([motion]), float(motion.root[:, 1].mean()))
+    assert reference.parts["bend"] == ("LArm1", "RArm1")
+    assert reference.parts["wrist_jerk"] == ("LHand", "RHand")
+    assert not {"sink", "lift", "slide"} & reference.parts.keys()
+    found = extremes([motion], reference)
+    for bounds in (bounds_of(reference, found), None):
+        assert check_motion(motion, bounds) == ()
+        rotations = np.array(motion.rotations)
+        elbow = motion.skeleton.names.index("LArm1")
+        axis = reference.axes[0]
+        back = Rotation.from_rotvec(-np.radians(150.0) * axis).as_matrix()
+        rotations[100:130, elbow] = back @ rotations[100:130, elbow]
+        findings = check_motion(replace(motion, rotations=rotations), bounds)
+        assert 100 <= of(findings, "backwards", "LArm1").first < 130
+        assert of(findings, "wrist_jerk", "LHand")
+    earlier = {name: values for name, values in extremes_to_json(found).items() if "bend" not in name}
+    read = extremes_from_json(earlier, reference, "run.json")
+    np.testing.assert_array_equal(bounds_of(reference, read).high["bend"], anybody(reference).high["bend"])

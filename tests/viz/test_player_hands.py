@@ -11,7 +11,9 @@ from a2g_jax.viz.player.shape import build_shape
 BEAT = upper_body_skeleton(TALKER_HANDS_SKELETON)
 
 
-@pytest.mark.parametrize(("skeleton", "wrist"), [(TALKER_HANDS_SKELETON, "L_Wrist"), (BEAT, "LHand"), (BEAT, "RHand")])
+@pytest.mark.parametrize(
+    ("skeleton", "wrist"), [(TALKER_HANDS_SKELETON, "L_Wrist"), (BEAT, "LeftHand"), (BEAT, "RightHand")]
+)
 def test_five_fingers_of_three_bones_with_one_thumb_and_one_little_finger(skeleton, wrist):
     fingers = find_fingers(skeleton, skeleton.index(wrist), rest_positions(skeleton))
     assert [len(finger.joints) for finger in fingers] == [3] * 5

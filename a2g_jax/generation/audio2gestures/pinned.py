@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
 from a2g_jax.generation.audio2gestures.pins import pin_codes
+from a2g_jax.generation.drafts import Draft, enter, recorded
 from a2g_jax.generation.pins.pinned import OF_CORPUS, OF_MOTIONS, jerk_limit, own_limit, pin_lane
 from a2g_jax.generation.pins.report import Ends, report_pins
 from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
@@ -64,8 +66,11 @@ class Pinned:
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Samples of :meth:`~a2g_jax.generation.generator.Generator.stream` with the pinned clips."""
+        return recorded(self.drafts(audio, samples, seed))
+
+    def drafts(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Draft]:
+        """The motions of :meth:`stream`, which add to the reports when they are recorded."""
         edits = self.space.sampling.all_edits
-        self.reports.clear()
         for sample in range(samples):
             codes = self.space.edit(self.space.from_audio(audio, seed, sample), *edits)
             plain = self.space.to_motion(codes)
@@ -74,9 +79,12 @@ class Pinned:
             limit, source = self.limit, OF_CORPUS
             if limit is None:
                 limit, source = own_limit([plain, *(pin.motion for pin in self.pins)]), OF_MOTIONS
-            blend = round(self.request.blend * motion.fps)
-            self.reports.append(report_pins(self.pins, motion, plain, limit, source, Ends(blend, blend, blend)))
-            yield motion
+            yield Draft(motion, partial(self._record, plain, limit, source))
+
+    def _record(self, plain: Motion, limit: float, source: str, sample: int, motion: Motion) -> None:
+        blend = round(self.request.blend * motion.fps)
+        ends = Ends(blend, blend, blend)
+        enter(self.reports, sample, report_pins(self.pins, motion, plain, limit, source, ends))
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""

@@ -68,7 +68,7 @@ def decay(near: Float[np.ndarray, "k *d"], shape: Shape) -> Float[np.ndarray, "n
 
 
 def bridge(
-    near: Float[np.ndarray, "k *d"], far: Float[np.ndarray, "k *d"], frames: int, order: int
+    near: Float[np.ndarray, "k *d"], far: Float[np.ndarray, "m *d"], frames: int, order: int
 ) -> Float[np.ndarray, "n *d"]:
     """The path from the end of a clip to where a motion is some frames later, with the velocity of either there.
 

@@ -21,6 +21,9 @@ _TWO_STEPS = 0.8
 _CALM = 0.5
 #: Fastest turn of a joint that is ordinary, degrees per second.
 _TURN = 900.0
+#: Turn of hips, knees and ankles in a transition, degrees per second, or in times that of the clip and of the motion,
+#: from which longer transitions are tried: of these least lengths, seconds. One is taken if it takes a tenth off.
+_LEG_TURN, _LEG_TURNS, _LONGER, _WORTH = 150.0, 1.5, (0.5, 0.8, 1.25, 2.0), 0.9
 #: Frames at either end of a changed stretch over which the root's lowering begins and ends.
 _EDGE = 6
 
@@ -68,10 +71,65 @@ def perform(
         pins: in order of time, apart, and within the motion.
         standing: their motions, on their feet by the same rule as the generated one.
         jerk: limit for the hands in transitions, m/s3.
-        length: seconds of each transition; None for as short as jerk and speed allow.
+        length: seconds of each transition; None for as short as jerk, speed, and turns of the legs allow.
     """
-    feet = feet_of(plain)
-    placed = [_place(plain, feet, pins, number, clip, jerk, length) for number, clip in enumerate(standing)]
+    feet, least = feet_of(plain), [0.0] * len(pins)
+    result, placed = _perform(plain, feet, pins, standing, jerk, length, least)
+    if feet is None or length is not None:
+        return result, placed
+    # Legs are placed by inverse kinematics after the transitions are planned, over the footholds of all clips.
+    limits = [_leg_limit(plain, feet, one) for one in placed]
+    turns = [_leg_turn(result, feet, one) for one in placed]
+    for longer in _LONGER:
+        fast = [number for number in range(len(pins)) if turns[number] > limits[number]]
+        if not fast:
+            break
+        tried = [longer if number in fast else value for number, value in enumerate(least)]
+        other, there = _perform(plain, feet, pins, standing, jerk, length, tried)
+        slower = {number: _leg_turn(other, feet, there[number]) for number in fast}
+        taken = [number for number in fast if slower[number] < _WORTH * turns[number]]
+        if not taken:
+            continue
+        for number in taken:
+            least[number], turns[number] = longer, slower[number]
+        result, placed = (
+            (other, there) if least == tried else _perform(plain, feet, pins, standing, jerk, length, least)
+        )
+    return result, placed
+
+
+def _leg_limit(plain: Motion, feet: Feet, one: Placed) -> float:
+    """Turn of leg joints from which a longer transition is tried, degrees per second."""
+    around = plain.clip(max(one.start - 1, 0), min(one.stop + 1, plain.frames))
+    own = max(_turn_of_legs(motion, feet) for motion in (around, one.clip))
+    return max(_LEG_TURN, _LEG_TURNS * own)
+
+
+def _leg_turn(motion: Motion, feet: Feet, one: Placed) -> float:
+    """Fastest turn of a leg joint in the transitions of a clip, degrees per second."""
+    spans = ((one.start - 1, one.pin.first + 1), (one.pin.stop - 1, one.stop + 1))
+    return max(_turn_of_legs(motion.clip(max(low, 0), min(high, motion.frames)), feet) for low, high in spans)
+
+
+def _turn_of_legs(motion: Motion, feet: Feet) -> float:
+    joints = [joint for leg in feet.legs for joint in (leg.hip, leg.knee, leg.ankle)]
+    rotations = np.asarray(motion.rotations, np.float64)[:, joints]
+    return float(rotation_angle(rotations[1:], rotations[:-1]).max(initial=0.0)) * motion.fps
+
+
+def _perform(
+    plain: Motion,
+    feet: Feet | None,
+    pins: Sequence[Pin],
+    standing: Sequence[Motion],
+    jerk: float,
+    length: float | None,
+    least: Sequence[float],
+) -> tuple[Motion, list[Placed]]:
+    """The motion with clips in it whose transitions have a least length each."""
+    placed = [
+        _place(plain, feet, pins, number, clip, jerk, length, least[number]) for number, clip in enumerate(standing)
+    ]
     rotations = np.array(plain.rotations, np.float64)
     root = np.array(plain.root, np.float64)
     for one in placed:
@@ -92,7 +150,14 @@ def perform(
 
 
 def _place(
-    plain: Motion, feet: Feet | None, pins: Sequence[Pin], number: int, clip: Motion, jerk: float, length: float | None
+    plain: Motion,
+    feet: Feet | None,
+    pins: Sequence[Pin],
+    number: int,
+    clip: Motion,
+    jerk: float,
+    length: float | None,
+    least: float,
 ) -> Placed:
     pin = pins[number]
     inside = slice(pin.first, pin.stop)
@@ -111,7 +176,7 @@ def _place(
     limits = Limits(jerk, ROUGH_SPEED * max(float(top), _CALM), max(float(turns), _TURN))
     left = pins[number - 1].stop if number > 0 else 0
     right = pins[number + 1].first if number + 1 < len(pins) else plain.frames
-    least = 0.0 if own is None else _TWO_STEPS
+    least = max(least, 0.0 if own is None else _TWO_STEPS)
     seams = (
         Seam(pin.first, -1, pin.first - left, number == 0),
         Seam(pin.stop - 1, 1, right - pin.stop, number + 1 == len(pins)),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +11,10 @@ from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
+from a2g_jax.generation.drafts import Draft, drafts_of, enter, recorded
 from a2g_jax.generation.generator import Sampler, plant_rotations
 from a2g_jax.generation.pins.perform import perform
-from a2g_jax.generation.pins.report import corpus_jerk, report_pins
+from a2g_jax.generation.pins.report import Ends, corpus_jerk, report_pins
 from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.poses import rotation_angle
@@ -75,21 +77,35 @@ class PinnedClips:
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """The samples of the sampler, with the clips; equal to them, bit by bit, beyond the transitions."""
-        standing = [plant_rotations(self.run, np.asarray(pin.motion.rotations)) for pin in self.pins]
-        self.reports.clear()
-        for plain in self.sampler.stream(audio, samples, seed):
+        return recorded(self.drafts(audio, samples, seed))
+
+    def drafts(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Draft]:
+        """The motions of :meth:`stream`, which add to the reports when they are recorded."""
+        for below in drafts_of(self.sampler, audio, samples, seed):
             limit, source = self.limit, OF_CORPUS
             if limit is None:
-                limit, source = own_limit([plain, *(pin.motion for pin in self.pins)]), OF_MOTIONS
-            motion, placed = perform(plain, self.pins, standing, limit, self.length)
-            self.reports.append(report_pins(self.pins, motion, plain, limit, source, [one.ends for one in placed]))
-            yield motion
+                limit, source = own_limit([below.motion, *(pin.motion for pin in self.pins)]), OF_MOTIONS
+            motion, placed = perform(below.motion, self.pins, self.standing, limit, self.length)
+            yield Draft(motion, partial(self._record, below, (limit, source), [one.ends for one in placed]))
+
+    def _record(self, below: Draft, limit: tuple[float, str], ends: list[Ends], sample: int, motion: Motion) -> None:
+        below.record(sample, motion)
+        enter(self.reports, sample, report_pins(self.pins, motion, below.motion, *limit, ends))
+
+    @cached_property
+    def standing(self) -> tuple[Motion, ...]:
+        """The motions of the clips, on their feet as those of the run are."""
+        return tuple(plant_rotations(self.run, np.asarray(pin.motion.rotations)) for pin in self.pins)
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
-        """The clips, whose own extremes are allowed where they are higher than the bounds of the run."""
+        """The clips, whose own extremes are allowed where they are higher than the bounds of the run: those of the
+        clips as they are performed, on their feet, not of the roots and legs in their files."""
         bounds = self.run.config.body_bounds
-        return tuple(Stretch(pin.first, pin.stop, bounds.loosened(pin.motion, pin.name)) for pin in self.pins)
+        return tuple(
+            Stretch(pin.first, pin.stop, bounds.loosened(standing, pin.name))
+            for pin, standing in zip(self.pins, self.standing, strict=True)
+        )
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""

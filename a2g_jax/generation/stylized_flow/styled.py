@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clips import read_motion
+from a2g_jax.generation.drafts import Draft, enter, recorded
 from a2g_jax.generation.generator import speech_features
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
@@ -133,20 +135,19 @@ class Styled:
     _matched: list[tuple[bytes, Style, StyleTarget | None]] = field(default_factory=list)
     """The last speech, its style with requests, and the target of reports."""
 
-    @property
-    def varies(self) -> bool:
-        """Whether another seed gives another motion: not if the latents of the style replace all drawn ones."""
-        whole = self.style is not None and self.style.share * self.style.trust == 1.0
-        return not (whole and self.style is not None and self.style.mode == "repeat")
-
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
-        self.reports.clear()
+        return recorded(self.drafts(audio, samples, seed))
+
+    def drafts(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Draft]:
+        """The motions of :meth:`stream`, which add to the reports when they are recorded."""
         style, target = (None, None) if self.style is None else self._for_speech(self.style, audio)
         for motion in self.space.stream(audio, samples, seed, style, self.seed_poses):
-            rate = self.space.run.config.mel.sample_rate
-            self.reports.append(None if target is None else report_style(motion, audio, rate, target))
-            yield motion
+            yield Draft(motion, partial(self._record, audio, target))
+
+    def _record(self, audio: Float[np.ndarray, " N"], target: StyleTarget | None, sample: int, motion: Motion) -> None:
+        rate = self.space.run.config.mel.sample_rate
+        enter(self.reports, sample, None if target is None else report_style(motion, audio, rate, target))
 
     def _for_speech(self, style: Style, audio: Float[np.ndarray, " N"]) -> tuple[Style, StyleTarget | None]:
         """The style with requests for a speech, found once for all samples and draws, and the target of reports."""

@@ -127,7 +127,8 @@ def bounds_of(reference: Reference, found: Values | None) -> BodyBounds:
     """Bounds from a corpus's extremes; those of any person without them."""
     if found is None:
         return anybody(reference)
-    return BodyBounds(reference, widened(found, reference), "the training split with margins")
+    high = {**anybody(reference).high, **widened(found, reference)}
+    return BodyBounds(reference, high, "the training split with margins")
 
 
 def widened(found: Values, reference: Reference) -> dict[str, Float[np.ndarray, " _"]]:
@@ -145,7 +146,8 @@ def extremes_to_json(found: Values) -> dict[str, list[float]]:
 
 
 def extremes_from_json(value: object, reference: Reference, where: str) -> dict[str, Float[np.ndarray, " _"]]:
-    """Inverse of :func:`extremes_to_json`.
+    """Inverse of :func:`extremes_to_json`. Figures may be missing, as those of elbows and wrists are in runs
+    of upper bodies by earlier versions.
 
     Args:
         where: file and entry, for the error.
@@ -153,11 +155,12 @@ def extremes_from_json(value: object, reference: Reference, where: str) -> dict[
     Raises:
         InputError: other figures, numbers of joints or values.
     """
-    expected = {name: len(parts) for name, parts in reference.parts.items()}
+    expected = {name: (len(parts),) for name, parts in reference.parts.items()}
     try:
         assert isinstance(value, dict)
         found = {str(name): np.asarray(values, np.float64) for name, values in value.items()}
-        assert {name: values.shape for name, values in found.items()} == {name: (n,) for name, n in expected.items()}
+        assert all(values.shape == expected.get(name) for name, values in found.items())
+        assert {"turn", "range"} <= found.keys()
         assert all(np.isfinite(values).all() for values in found.values())
     except (AssertionError, TypeError, ValueError):
         raise InputError(f"{where}: is damaged; restore the file, or remove the entry.") from None
@@ -169,9 +172,10 @@ def _both_sides(values: Float[np.ndarray, " _"], name: str, reference: Reference
     parts = reference.parts[name]
     values = values.copy()
     for role, joint in reference.joints.items():
-        if not role.startswith("L_"):
+        other = reference.joints.get("R_" + role[2:]) if role.startswith("L_") else None
+        if other is None:
             continue
-        pair = [reference.skeleton.names[at] for at in (joint, reference.joints["R_" + role[2:]])]
+        pair = [reference.skeleton.names[at] for at in (joint, other)]
         if all(part in parts for part in pair):
             columns = [parts.index(part) for part in pair]
             values[columns] = values[columns].max()

@@ -125,7 +125,7 @@ def _own_reference(motion: Motion) -> Reference:
     turned = np.sign(np.linalg.det(left @ right))
     left[..., -1] *= turned[:, None]
     reference = Reference(motion.skeleton, left @ right, 0.0)
-    if not reference.joints:
+    if not reference.feet:
         return reference
     # The floor is where the feet of the motion are lowest.
     lowest = np.percentile(motion.positions()[:, reference.feet, 1].min(axis=1), 5.0)

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from a2g_jax.geometry.body_joints import find_body_joints
+from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.poses import angle_between, joint_places, rotation_angle, unit, world_rotations
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
@@ -23,7 +24,11 @@ HINGES = ("L_Elbow", "R_Elbow", "L_Knee", "R_Knee")
 WRISTS = ("L_Wrist", "R_Wrist")
 FEET = ("L_Ankle", "R_Ankle", "L_Foot", "R_Foot")
 #: Joint above and joint below each hinge.
-_AROUND = (("L_Shoulder", "L_Wrist"), ("R_Shoulder", "R_Wrist"), ("L_Hip", "L_Ankle"), ("R_Hip", "R_Ankle"))
+_AROUND = {
+    f"{side}_{hinge}": (f"{side}_{above}", f"{side}_{below}")
+    for hinge, above, below in (("Elbow", "Shoulder", "Wrist"), ("Knee", "Hip", "Ankle"))
+    for side in "LR"
+}
 
 #: Seconds over which the slide of a standing foot is measured.
 SLIDE_SECONDS = 0.5
@@ -43,9 +48,23 @@ class Reference:
 
     @cached_property
     def joints(self) -> dict[str, int]:
-        """Index of each of the 22 body joints; empty if they are not recognised."""
+        """Index of each of the 22 body joints; of those that are recognised by their names on a skeleton that lacks
+        some, such as an upper body."""
         found = find_body_joints(self.skeleton)
-        return {} if found is None else dict(zip(BODY_JOINTS, found, strict=True))
+        if found is not None:
+            return dict(zip(BODY_JOINTS, found, strict=True))
+        named = named_joints(self.skeleton.names)
+        return {role: named[role] for role in BODY_JOINTS if role in named}
+
+    @cached_property
+    def hinges(self) -> tuple[str, ...]:
+        """Those of :data:`HINGES` that the skeleton has, with the joints above and below them."""
+        return tuple(role for role in HINGES if {role, *_AROUND[role]} <= self.joints.keys())
+
+    @cached_property
+    def wrists(self) -> tuple[str, ...]:
+        """Those of :data:`WRISTS` that the skeleton has."""
+        return tuple(role for role in WRISTS if role in self.joints)
 
     @cached_property
     def parts(self) -> dict[str, tuple[str, ...]]:
@@ -53,39 +72,42 @@ class Reference:
         names = self.skeleton.names
         own = lambda roles: tuple(names[self.joints[role]] for role in roles)  # noqa: E731
         parts = {"turn": names, "range": names, "tilt": names[:1], "root_speed": names[:1]}
-        if not self.joints:
-            return parts
-        hinges = dict.fromkeys(("bend", "backwards", "sideways"), own(HINGES))
-        wrists = dict.fromkeys(("wrist_speed", "wrist_jerk"), own(WRISTS))
-        return parts | hinges | wrists | dict.fromkeys(("sink", "slide"), own(FEET)) | {"lift": own(("Pelvis",))}
+        if self.hinges:
+            parts |= dict.fromkeys(("bend", "backwards", "sideways"), own(self.hinges))
+        if self.wrists:
+            parts |= dict.fromkeys(("wrist_speed", "wrist_jerk"), own(self.wrists))
+        if self.feet:
+            parts |= dict.fromkeys(("sink", "slide"), own(FEET)) | {"lift": own(("Pelvis",))}
+        return parts
 
     @cached_property
     def feet(self) -> list[int]:
-        """Ankles and toes, in the order of :data:`FEET`."""
-        return [self.joints[role] for role in FEET]
+        """Ankles and toes, in the order of :data:`FEET`; none where one of them or the pelvis is missing."""
+        return [self.joints[role] for role in FEET] if {*FEET, "Pelvis"} <= self.joints.keys() else []
 
     @cached_property
-    def soles(self) -> Float[np.ndarray, " 4"]:
+    def soles(self) -> Float[np.ndarray, " feet"]:
         """Height of ankles and toes in the mean pose, metres: where the feet stand."""
         world = world_rotations(self.pose.astype(np.float64), self.skeleton.parents)
         places = joint_places(world, np.asarray(self.skeleton.offsets, np.float64), self.skeleton.parents)
         return self.height + places[self.feet, 1]
 
     @cached_property
-    def axes(self) -> Float[np.ndarray, "4 3"]:
+    def axes(self) -> Float[np.ndarray, "hinges 3"]:
         """Axis about which each hinge bends, a unit vector in the frame of the joint above; NaN if undetermined."""
-        axes = np.full((len(HINGES), 3), np.nan)
+        axes = np.full((len(self.hinges), 3), np.nan)
         pose = self.pose.astype(np.float64)
         world = world_rotations(pose, self.skeleton.parents)
         offsets = np.asarray(self.skeleton.offsets, np.float64)
-        for number, (hinge, (above, below)) in enumerate(zip(HINGES, _AROUND, strict=True)):
+        for number, hinge in enumerate(self.hinges):
+            above, below = _AROUND[hinge]
             bones = self._bones(number)
             if bones is None:
                 continue
             upper, lower = bones[0], pose[self.joints[hinge]] @ bones[1]
             if _BENT[hinge[2:]] < angle_between(upper, lower) < 170.0:
                 axes[number] = unit(np.cross(upper, lower))
-            elif below.endswith("Ankle"):
+            elif below.endswith("Ankle") and below.replace("Ankle", "Foot") in self.joints:
                 # A stretched knee bends across the foot.
                 toe = world[self.joints[below]] @ offsets[self.joints[below.replace("Ankle", "Foot")]]
                 axes[number] = unit(np.cross(world[self.joints[above]].T @ toe, upper))
@@ -94,8 +116,8 @@ class Reference:
     def _bones(self, number: int) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]] | None:
         """Directions of the bones above and below a hinge in the frames of their joints; None where joints lie between
         them, as twist joints do."""
-        hinge = self.joints[HINGES[number]]
-        above, below = (self.joints[role] for role in _AROUND[number])
+        hinge = self.joints[self.hinges[number]]
+        above, below = (self.joints[role] for role in _AROUND[self.hinges[number]])
         offsets = np.asarray(self.skeleton.offsets, np.float64)
         upper, lower = unit(offsets[hinge]), unit(offsets[below])
         chained = self.skeleton.parents[hinge] == above and self.skeleton.parents[below] == hinge
@@ -110,7 +132,7 @@ class Reference:
         with the plane of that flexion. ``wrist_speed`` (m/s) and ``wrist_jerk`` (m/s3): relative to the root.
         ``root_speed``: m/s. ``sink``: metres of ankles and toes below their height in the mean pose. ``lift``: height
         of the lowest of them above it, metres. ``slide``: metres that a foot moved along the floor in the half second
-        before, if it stood throughout. Only the first two and those of the root on skeletons whose body joints are not
+        before, if it stood throughout. Those of hinges, wrists or feet are missing where their joints are not
         recognised.
         """
         rotations, root = np.asarray(motion.rotations), np.asarray(motion.root)
@@ -122,20 +144,22 @@ class Reference:
             "root_speed": _speed(root[:, None], motion.fps),
         }
         found["range"][:, 0] = 0.0
-        if self.joints:
+        if self.hinges:
             found |= self._hinges(rotations)
-            places = motion.positions()
-            wrists = places[:, [self.joints[role] for role in WRISTS]] - root[:, None]
+        places = motion.positions() if self.wrists or self.feet else None
+        if places is not None and self.wrists:
+            wrists = places[:, [self.joints[role] for role in self.wrists]] - root[:, None]
             found["wrist_speed"] = _speed(wrists, motion.fps)
             jerk = np.linalg.norm(np.diff(wrists, n=3, axis=0), axis=-1) * motion.fps**3
             # The third difference of a jump is largest in the frame after it if it counts for the third of its four.
             found["wrist_jerk"] = _later(jerk, 2, motion.frames)
+        if places is not None and self.feet:
             found |= self._feet(places[:, self.feet], motion.fps)
         return found
 
-    def _hinges(self, rotations: Float[np.ndarray, "T J 3 3"]) -> dict[str, Float[np.ndarray, "T 4"]]:
-        flexion, sideways = np.zeros((2, len(rotations), len(HINGES)), rotations.dtype)
-        for number, (hinge, axis) in enumerate(zip(HINGES, self.axes, strict=True)):
+    def _hinges(self, rotations: Float[np.ndarray, "T J 3 3"]) -> dict[str, Float[np.ndarray, "T hinges"]]:
+        flexion, sideways = np.zeros((2, len(rotations), len(self.hinges)), rotations.dtype)
+        for number, (hinge, axis) in enumerate(zip(self.hinges, self.axes, strict=True)):
             bones = self._bones(number)
             if bones is None or np.isnan(axis).any():
                 continue
