@@ -97,7 +97,7 @@ def train(
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
         config = keep_sampling(config, out)
-    elif model.use_words is not None:
+    elif start is None and model.use_words is not None:
         state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
     config = replace(config, body_extremes=extremes)
