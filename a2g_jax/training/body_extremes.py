@@ -1,26 +1,33 @@
-"""Extremes of a corpus's training motion, against which generated motion is checked."""
+"""Extremes of a run's training motion, against which generated motion is checked."""
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
-from a2g_jax.metrics.body.bounds import LEAST_FRAMES, MOST_FRAMES, extremes
-from a2g_jax.metrics.body.figures import Reference
+from a2g_jax.metrics.body.bounds import LEAST_SECONDS, MOST_FRAMES, extremes
+from a2g_jax.training.run_config import RunConfig
 
 
-def corpus_extremes(corpus: Corpus) -> dict[str, Float[np.ndarray, " _"]] | None:
-    """Extremes of the training split (:func:`~a2g_jax.metrics.body.bounds.extremes`).
+def corpus_extremes(corpus: Corpus, config: RunConfig) -> dict[str, Float[np.ndarray, " _"]] | None:
+    """Extremes of the training split (:func:`~a2g_jax.metrics.body.bounds.extremes`), relative to the run's mean pose.
 
-    Of a long corpus every n-th stretch counts. None without rotations, and for less than a minute of motion, which has
-    too few gestures to tell what its people do not do.
+    Of a long corpus every n-th stretch counts. Less than a minute has too few gestures to tell what its people do not
+    do: it raises the extremes that the run has already, which are those of the run that it started from.
+
+    Args:
+        corpus: with the whole training split, also what is held out of it for validation.
+        config: its ``body_extremes`` are None, unless the run started from another one.
+
+    Returns:
+        The extremes; None without rotations, and for less than a minute where the run has none.
     """
     if not corpus.space.has_rotations or not corpus.splits.get("train"):
         return None
     segments = corpus.segments("train")
     frames = sum(segment.stop - segment.start for segment in segments)
-    if frames < LEAST_FRAMES:
+    earlier = None if frames >= LEAST_SECONDS * corpus.fps else config.body_extremes
+    if earlier is None and frames < LEAST_SECONDS * corpus.fps:
         return None
     chosen = segments[:: -(-frames // MOST_FRAMES)]
-    pose, root = corpus.statistics["pose"].mean, corpus.statistics["root"].mean
-    reference = Reference(corpus.skeleton, np.asarray(corpus.space.mean_rotations(pose), np.float64), float(root[1]))
-    return extremes((corpus.motion(segment.start, segment.stop) for segment in chosen), reference)
+    found = extremes((corpus.motion(segment.start, segment.stop) for segment in chosen), config.body_reference)
+    return found if earlier is None else {name: np.maximum(found[name], earlier[name]) for name in found}

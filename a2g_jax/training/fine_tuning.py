@@ -75,6 +75,7 @@ def tuned_config(
         space=run.config.space,
         statistics=adapted_statistics(run.config.statistics, corpus.statistics, source),
         sampling=run.config.sampling,
+        body_extremes=run.config.body_extremes,
         source=source,
     )
     _check_networks(config, run, corpus)

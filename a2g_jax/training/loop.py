@@ -73,6 +73,7 @@ def train(
     settings = config.train_config
     # Errors are found before anything is written.
     model = training_model(config)
+    extremes = corpus_extremes(corpus, config)
     if config.source is not None:
         corpus, note = with_validation(corpus, model.clip_frames)
         if note and progress:
@@ -96,10 +97,10 @@ def train(
     if resume and (restored := checkpoints.restore(state)) is not None:
         state = restored
         config = keep_sampling(config, out)
-    elif model.use_words is not None:
+    elif start is None and model.use_words is not None:
         state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
-    config = replace(config, body_extremes=corpus_extremes(corpus))
+    config = replace(config, body_extremes=extremes)
     export = partial(_export, config, model, corpus, out)
     make_folder(out)
     sweep_unfinished(checkpoints.folder)

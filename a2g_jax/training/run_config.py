@@ -75,7 +75,9 @@ class RunConfig:
     sampling: Any = None
     """Sampling settings; None for those of the preset."""
     body_extremes: Values | None = None
-    """Extremes of the training split's motion (:func:`~a2g_jax.metrics.body.bounds.extremes`); None if not measured."""
+    """Extremes of the training split's motion (:func:`~a2g_jax.metrics.body.bounds.extremes`), relative to the mean of
+    :attr:`statistics`; None if not measured. Training of a run that starts from another one begins with those of that
+    run."""
     source: Source | None = None
     """The run that training started from; None for initial weights."""
 

@@ -8,6 +8,7 @@ its checkpoints. This command needs neither checkpoints nor training; the weight
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from a2g_jax.data.corpus import Corpus
@@ -15,6 +16,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.files import read_json, write_json
 from a2g_jax.metrics.body.bounds import extremes_to_json
 from a2g_jax.training.body_extremes import corpus_extremes
+from a2g_jax.training.run import open_run
 from a2g_jax.training.run_file import RUN_FILE, run_folder
 
 
@@ -24,11 +26,11 @@ def add_extremes(run: str, corpus: Path) -> None:
     Raises:
         InputError: another corpus than that of the run, or one without extremes.
     """
-    opened, about = Corpus.open(corpus), run_folder(run) / RUN_FILE
+    opened, about, config = Corpus.open(corpus), run_folder(run) / RUN_FILE, open_run(run).config
     values = read_json(about)
     if values["corpus"]["fingerprint"] != opened.fingerprint:
         raise InputError(f"{about}: was trained on another corpus than {corpus}; name the one that it was trained on.")
-    found = corpus_extremes(opened)
+    found = corpus_extremes(opened, config if config.source else replace(config, body_extremes=None))
     if found is None:
         raise InputError(f"{corpus}: has less than a minute of training motion, or no rotations.")
     write_json(about, values | {"body_extremes": extremes_to_json(found)})

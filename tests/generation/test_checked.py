@@ -26,7 +26,7 @@ SOUND = talk(6.0, 21).motion
 @pytest.fixture(scope="module")
 def run(toy_run_config, toy_corpus):
     """A run without weights: the samplers here draw by themselves."""
-    return Run(replace(toy_run_config(), body_extremes=corpus_extremes(toy_corpus)), {}, {}, 0)
+    return Run(replace(toy_run_config(), body_extremes=corpus_extremes(toy_corpus, toy_run_config())), {}, {}, 0)
 
 
 def broken(motion, frame=60, joint="L_Elbow"):
@@ -210,9 +210,9 @@ def test_seeds_of_draws_are_distinct():
 
 def test_extremes_in_a_run(toy_run_config, toy_corpus, tmp_path, monkeypatch):
     """They are measured with a minute of training motion, and survive the run's folder."""
-    assert corpus_extremes(toy_corpus) is None
-    monkeypatch.setattr("a2g_jax.training.body_extremes.LEAST_FRAMES", 100)
-    found = corpus_extremes(toy_corpus)
+    assert corpus_extremes(toy_corpus, toy_run_config()) is None
+    monkeypatch.setattr("a2g_jax.training.body_extremes.LEAST_SECONDS", 3.0)
+    found = corpus_extremes(toy_corpus, toy_run_config())
     config = replace(toy_run_config(), body_extremes=found)
     import jax
 

@@ -11,8 +11,8 @@ from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
 from a2g_jax.generation.audio2gestures.pins import pin_codes, pin_weights
-from a2g_jax.generation.pins.report import Ends, report_pins
 from a2g_jax.generation.pins.form import parse_pin
+from a2g_jax.generation.pins.report import Ends, report_pins
 from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import face, same_rest

@@ -16,9 +16,11 @@ Values = Mapping[str, Float[np.ndarray, " _"]]
 #: Quantile of a corpus's frames that counts as its extreme. The maximum of hours of motion capture is often a fault of
 #: the capture; a single frame in ten thousand is not what a person does either.
 QUANTILE = 0.9999
-#: Frames of training motion from which extremes are measured, and at most as many: a minute at 30 frames a second has
-#: too few gestures to tell what the person does not do; more than hours of it change nothing.
-LEAST_FRAMES, MOST_FRAMES = 1800, 200_000
+#: Seconds of training motion from which extremes stand alone: less has too few gestures to tell what a person does not
+#: do.
+LEAST_SECONDS = 60.0
+#: Frames of which they are measured at most: more than an hour changes nothing.
+MOST_FRAMES = 200_000
 
 
 @dataclass(frozen=True)
