@@ -104,17 +104,22 @@ class Styling:
     def _seed(self, space: FlowSpace) -> Fitted:
         assert self.seed_clip is not None
         motion, fps = read_motion(self.seed_clip.path), space.run.config.fps
-        frames = round(motion.seconds * fps)
-        if frames < space.history:
-            raise InputError(
-                f"{self.seed_clip.label}: has {frames} frames at the run's {fps:g} fps; give a clip of"
-                f" {space.history} or more."
-            )
+        self._check_seed(round(motion.seconds * fps), space)
         # Only its end is continued, and faults before it do not matter.
         needed = round((space.history / fps + _BEFORE_SEED) * motion.fps)
-        return fit(
-            motion.clip(max(0, motion.frames - needed), motion.frames), space.run, self.seed_clip.label, whole=False
-        )
+        end = motion.clip(max(0, motion.frames - needed), motion.frames)
+        fitted = fit(end, space.run, self.seed_clip.label, whole=False)
+        # Without a leading T-pose, and with no frame beyond its last one, it may be shorter than the file.
+        self._check_seed(len(fitted.rows), space)
+        return fitted
+
+    def _check_seed(self, frames: int, space: FlowSpace) -> None:
+        assert self.seed_clip is not None
+        if frames < space.history:
+            raise InputError(
+                f"{self.seed_clip.label}: has {frames} frames at the run's {space.run.config.fps:g} fps; give a clip of"
+                f" {space.history} or more."
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +137,6 @@ class Styled:
     """Report on each sample of :meth:`stream` so far; None without a style."""
     _matched: list[tuple[bytes, Style, StyleTarget | None]] = field(default_factory=list)
     """The last speech, its style with requests, and the target of reports."""
-
-    @property
-    def varies(self) -> bool:
-        """Whether another seed gives another motion: not if the latents of the style replace all drawn ones."""
-        whole = self.style is not None and self.style.share * self.style.trust == 1.0
-        return not (whole and self.style is not None and self.style.mode == "repeat")
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
