@@ -47,7 +47,7 @@ def test_two_people_are_prepared_for_a_run_and_tuned_together(tmp_path, source, 
     assert "trained for 3 steps" in capsys.readouterr().out
     about = json.loads((tmp_path / "tuned" / "run.json").read_text())
     assert about["from"]["run"] == str(source)
-    # Resuming takes the source from the folder.
+    # Its description is enough to resume: the source may be gone, and --from is not needed.
     again = ["train", "audio2gestures", "--corpus", str(tmp_path / "c"), "--out", str(tmp_path / "tuned"), "--resume"]
     assert main(again) == 0
 

@@ -75,9 +75,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
         preset, *published = _source(options.source, options.model, entry)
     stored = None if options.settings or not options.resume else _stored(Path(options.out), options.model, entry)
     if stored is not None:
-        preset, *published, before = stored
-        options.source = options.source or before
-        existing_run(options.source)
+        preset, *published = stored
     model, training = parse_flags(extra, *published, hint=f"'a2g train {options.model} --settings'")
     if options.settings:
         print("# settings of the model", *settings_lines(model), "", "# settings of the training", sep="\n")
@@ -122,12 +120,11 @@ def _source(name: str, model: str, entry: Entry) -> tuple[str, Any, TrainConfig]
     return str(values.get("preset")), replace(settings, **tuning.settings), tuning.training
 
 
-def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConfig, str | None] | None:
-    """Preset, settings and source of the run in a folder; None where there is no run of that model."""
+def _stored(folder: Path, model: str, entry: Entry) -> tuple[str, Any, TrainConfig] | None:
+    """Preset and settings of the run in a folder; None where there is no run of that model."""
     about = folder / RUN_FILE
     if not about.is_file() or (values := read_description(folder)).get("model") != model:
         return None
     settings: Any = from_json(entry.config, split_settings(entry, values, about)[0], str(about))
     training = from_json(TrainConfig, values.get("train_config", {}), str(about))
-    source = values.get("from")
-    return str(values.get("preset")), settings, training, source.get("run") if isinstance(source, dict) else None
+    return str(values.get("preset")), settings, training

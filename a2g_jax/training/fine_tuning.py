@@ -74,12 +74,24 @@ def tuned_config(
         about,
         space=run.config.space,
         statistics=adapted_statistics(run.config.statistics, corpus.statistics, source),
-        sampling=run.config.sampling,
+        sampling=without_measured(run.config.sampling),
         body_extremes=run.config.body_extremes,
         source=source,
     )
     _check_networks(config, run, corpus)
     return config
+
+
+def without_measured(sampling: Any) -> Any:
+    """Sampling settings with the defaults of those that were measured on the run's weights, such as gains of controls.
+
+    They are the fields whose metadata have ``measured``; each has a default value, not a factory.
+    """
+    if sampling is None:
+        return None
+    return replace(
+        sampling, **{field.name: field.default for field in fields(sampling) if "measured" in field.metadata}
+    )
 
 
 def check_fits(name: str, config: RunConfig, corpus: Corpus) -> None:

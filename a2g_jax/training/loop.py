@@ -171,9 +171,11 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
     now = json.loads(json.dumps(run_to_json(config, 0)))
     changed = [
         f"{key.replace('_', ' ')}: {values.get(key)}, now {now.get(key)}"
-        for key in ("model", "fps", "feature_network", "from")
+        for key in ("model", "fps", "feature_network")
         if values.get(key) != now.get(key)
     ]
+    if _without_name(values.get("from")) != _without_name(now.get("from")):
+        changed.append(f"from: {values.get('from')}, now {now.get('from')}")
     free_settings = _FREE if on_demand else _FREE | {"part_steps"}
     for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
         before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
@@ -186,6 +188,11 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
         changed.append("the corpus")
     if changed:
         raise InputError(f"{out}: was trained with other settings ({'; '.join(changed)}); resume with the same ones.")
+
+
+def _without_name(source: Any) -> Any:
+    """What a run records of its source without the name or path, which may change; the hash of the weights does not."""
+    return {key: value for key, value in source.items() if key != "run"} if isinstance(source, dict) else source
 
 
 #: A whole step of training.

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import shutil
 import signal
 
 import jax
@@ -15,6 +16,7 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.inspection.runs import check_run
 from a2g_jax.models import find_model
 from a2g_jax.training import early_stopping, loop
+from a2g_jax.training import start as starting
 from a2g_jax.training.checkpoint import Checkpoints
 from a2g_jax.training.fine_tuning import (
     adapted_statistics,
@@ -24,9 +26,10 @@ from a2g_jax.training.fine_tuning import (
     tuned_config,
     with_validation,
     without_frozen,
+    without_measured,
 )
 from a2g_jax.training.loop import train
-from a2g_jax.training.run import load_run
+from a2g_jax.training.run import Run, load_run, open_run, save_run
 
 NETWORKS = ("audio_encoder", "decoder", "mapping_net", "motion_encoder")
 
@@ -214,3 +217,65 @@ def test_two_people_together(tmp_path, source, tuned, toy_corpus):
     config, params = tuned(steps=2)
     assert train(config, two, tmp_path / "run", resume=False, progress=False, start=params).steps == 2
     assert training_model(config).stages[0].warm_start is None
+
+
+def test_resuming_needs_only_the_run_itself(tmp_path, source, toy_corpus, monkeypatch):
+    """Not the run that it started from; that one may be moved, and another one is refused by its weights."""
+    moved = tmp_path / "start"
+    shutil.copytree(source, moved)
+    begun = start_from(moved, load_run(moved))
+    settings = dataclasses.replace(begun.run.config.train_config, steps=9)
+    config = tuned_config(begun, begun.run.config.model_config, settings, toy_corpus)
+    shifted = Statistics(config.statistics["audio"].mean + 1, config.statistics["audio"].std)
+    config = dataclasses.replace(config, statistics={**config.statistics, "audio": shifted})
+    out = tmp_path / "run"
+    save_run(out, Run(config, begun.run.params, begun.run.summary, 3))
+    trained = []
+
+    def record(config, corpus, folder, **given) -> Run:
+        trained.append((config, given))
+        return begun.run
+
+    monkeypatch.setattr(starting, "train", record)
+
+    def resumed(name=None):
+        about = ("audio2gestures", "tiny", config.model_config, settings, toy_corpus.path, out, True)
+        starting.run_training(*about, source=name)
+        return trained[-1]
+
+    # Without a checkpoint training starts again, which needs the source.
+    assert resumed()[0].source == begun.source
+    (out / "checkpoints" / "3").mkdir(parents=True)
+    shutil.rmtree(moved)
+    for name in (None, str(source)):
+        found, given = resumed(name)
+        assert found.source == begun.source
+        np.testing.assert_array_equal(found.statistics["audio"].mean, shifted.mean)
+        assert given["resume"]
+        assert equal_trees(given["start"], begun.run.params)
+    with pytest.raises(InputError, match="started from other weights than those of demo; resume without --from"):
+        resumed("demo")
+
+
+def test_the_path_of_a_source_is_no_setting(tmp_path, tuned):
+    config, params = tuned(steps=1)
+    save_run(tmp_path, Run(config, params, {}, 0))
+    check = lambda source: loop._check_folder(  # noqa: E731
+        tmp_path, dataclasses.replace(config, source=source), Checkpoints(tmp_path / "checkpoints", 1), True, False
+    )
+    check(dataclasses.replace(config.source, run="elsewhere"))
+    with pytest.raises(InputError, match="other settings"):
+        check(dataclasses.replace(config.source, weights="0" * 64))
+
+
+@pytest.mark.parametrize("name", ["demo", "demo-flow"])
+def test_gains_of_controls_are_not_those_of_the_source(name, source, toy_corpus):
+    """They were measured on other weights; other sampling settings stay."""
+    sampling = open_run(name).config.sampling
+    assert sampling.control_gains
+    assert without_measured(sampling) == dataclasses.replace(sampling, control_gains=())
+    run = load_run(source)
+    other = dataclasses.replace(run.config.sampling, control_gains=("energy=2",), noise_scale=0.7)
+    start = start_from(source, dataclasses.replace(run, config=dataclasses.replace(run.config, sampling=other)))
+    config = tuned_config(start, run.config.model_config, run.config.train_config, toy_corpus)
+    assert config.sampling == dataclasses.replace(other, control_gains=())

@@ -106,17 +106,22 @@ class Styling:
     def _seed(self, space: FlowSpace) -> Fitted:
         assert self.seed_clip is not None
         motion, fps = read_motion(self.seed_clip.path), space.run.config.fps
-        frames = round(motion.seconds * fps)
-        if frames < space.history:
-            raise InputError(
-                f"{self.seed_clip.label}: has {frames} frames at the run's {fps:g} fps; give a clip of"
-                f" {space.history} or more."
-            )
+        self._check_seed(round(motion.seconds * fps), space)
         # Only its end is continued, and faults before it do not matter.
         needed = round((space.history / fps + _BEFORE_SEED) * motion.fps)
-        return fit(
-            motion.clip(max(0, motion.frames - needed), motion.frames), space.run, self.seed_clip.label, whole=False
-        )
+        end = motion.clip(max(0, motion.frames - needed), motion.frames)
+        fitted = fit(end, space.run, self.seed_clip.label, whole=False)
+        # Without a leading T-pose, and with no frame beyond its last one, it may be shorter than the file.
+        self._check_seed(len(fitted.rows), space)
+        return fitted
+
+    def _check_seed(self, frames: int, space: FlowSpace) -> None:
+        assert self.seed_clip is not None
+        if frames < space.history:
+            raise InputError(
+                f"{self.seed_clip.label}: has {frames} frames at the run's {space.run.config.fps:g} fps; give a clip of"
+                f" {space.history} or more."
+            )
 
 
 @dataclass(frozen=True, eq=False)

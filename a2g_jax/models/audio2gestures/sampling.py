@@ -31,7 +31,9 @@ class Audio2GesturesSampling:
     """Requested properties of the motion, as quantiles of the training clips from 0 to 1: energy, height, radius, rate
     and handedness (0 left, 1 right), such as 'energy=0.9', or over seconds 'energy=0.2@0,0.9@10'; and an emotion of
     the corpus, such as 'emotion=happiness'. What is not named is free. For runs with stored codes; may be repeated."""
-    control_gains: tuple[str, ...] = field(default=(), metadata={"flag": "control-gain", "repeat": True})
+    control_gains: tuple[str, ...] = field(
+        default=(), metadata={"flag": "control-gain", "repeat": True, "measured": True}
+    )
     """Factor on the distance of a requested property from the median of the training clips, such as 'energy=1.5': the
     inverse of how far motion follows a request. All that are needed, since they replace the run's; may be repeated."""
 

@@ -26,7 +26,9 @@ class StylizedFlowSampling:
     """Requested energy, height and radius of the hands, as quantiles of the training clips from 0 to 1, such as
     'height=0.9', or over seconds 'height=0.1@0,0.9@5'. What is not named is free, or 0.5 in runs trained without
     --control-dropout. For runs with --style-controls; may be repeated."""
-    control_gains: tuple[str, ...] = field(default=(), metadata={"flag": "control-gain", "repeat": True})
+    control_gains: tuple[str, ...] = field(
+        default=(), metadata={"flag": "control-gain", "repeat": True, "measured": True}
+    )
     """Factor on the distance of a requested control from the median of the training clips, such as 'energy=1.5': the
     inverse of how far motion follows a request. All that are needed, since they replace the run's; may be repeated."""
 
