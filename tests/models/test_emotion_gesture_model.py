@@ -15,7 +15,7 @@ from a2g_jax.models.emotion_gesture.config import PRESETS
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder
 from a2g_jax.models.emotion_gesture.model import build
 from a2g_jax.models.emotion_gesture.networks import Networks
-from a2g_jax.models.emotion_gesture.objective import generate
+from a2g_jax.models.emotion_gesture.objective import generate, judged
 from a2g_jax.models.emotion_gesture.prompter import interpolate, reinforce
 from a2g_jax.models.emotion_gesture.sampling import EmotionGestureSampling
 from a2g_jax.models.registry import find_model
@@ -294,6 +294,39 @@ class TestObjective:
         assert abs(expected) > 1e-3
         np.testing.assert_allclose(inner, expected, rtol=1e-4)
 
+    @pytest.mark.parametrize("discriminator", ["patches", "transformer"])
+    def test_the_discriminators(self, discriminator):
+        """Patches are judged with audio and emotion, from the last initial pose on; as published, all differences."""
+        config = replace(CONFIG, discriminator=discriminator)
+        networks, batch = Networks(config, make_data()), make_batch()
+        params = make_params(build(config, make_data()))
+        motion, label = networks.flat(batch.pose), jax.nn.one_hot(batch.emotion, 3)
+        logits = networks.judge(params, motion, batch.audio, label)
+        assert logits.shape == ((6,) if discriminator == "patches" else (3,))
+        patches = discriminator == "patches"
+        changed = {
+            "audio": networks.judge(params, motion, -batch.audio, label),
+            "label": networks.judge(params, motion, batch.audio, jnp.roll(label, 1, axis=1)),
+            "first": networks.judge(params, motion.at[:, :2].multiply(2.0), batch.audio, label),
+        }
+        expected = {"audio": patches, "label": patches, "first": not patches}
+        assert {name: bool(np.any(value != logits)) for name, value in changed.items()} == expected
+
+    def test_emotion_features_are_exchanged_with_their_labels(self):
+        networks, batch = Networks(CONFIG, make_data()), make_batch()
+        params = make_params(build(CONFIG, make_data()))
+        audio, made, target = generate(networks, params, batch)
+        both = judged(networks, params, batch, audio, made, None)
+        np.testing.assert_array_equal(both.motion[:3], made)
+        np.testing.assert_array_equal(both.label[3:], jnp.roll(both.label[:3], 1, axis=0))
+        np.testing.assert_array_equal(both.audio[3:], both.audio[:3])
+        mixed = audio._replace(emotion=audio.emotion[jnp.array([2, 0, 1])])
+        own = networks.decode(params, mixed, target[:, : CONFIG.seed_frames])
+        np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
+        assert np.abs(both.motion[3:] - made).max() > 1e-3
+        for config in (replace(CONFIG, exchange=False), replace(CONFIG, discriminator="transformer")):
+            assert len(judged(Networks(config, make_data()), params, batch, audio, made, None).motion) == 3
+
     def test_the_vae_has_the_numerical_gradient_and_trains_alone(self, x64):
         model = build(CONFIG, make_data())
         params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
@@ -353,6 +386,9 @@ class TestSettings:
             ({"dropout": 1.0}, "--dropout: expected 0 or more and below 1; got 1.0."),
             ({"layers": 0}, "--layers: expected 1 or more; got 0."),
             ({"vae_steps": -1}, "--vae-steps: expected 0 or more; got -1."),
+            ({"smoothing": -1}, "--smoothing: expected 0 or more; got -1."),
+            ({"discriminator_rate": 0.0}, "--discriminator-rate: expected a number above 0; got 0.0."),
+            ({"discriminator": "cnn"}, "--discriminator: expected one of transformer, patches; got cnn."),
         ],
     )
     def test_refused(self, changes, message):

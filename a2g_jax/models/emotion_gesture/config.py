@@ -11,6 +11,7 @@ POOLS = ("flat", "mean")
 PROMPTERS = ("spatial-temporal", "spatial", "predictor", "duplicate", "zero")
 PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
+DISCRIMINATORS = ("transformer", "patches")
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,18 @@ class EmotionGestureConfig:
     pose by learned shares."""
     normalise_pose: bool = False
     """Whether networks and losses have poses as z-scores; poses of other kinds than 6D always are."""
+    smoothing: int = 0
+    """Binomial filters over time that end the decoder."""
+    discriminator: str = "transformer"
+    """'transformer': of the differences between frames, as published; 'patches': convolutions over poses, differences
+    and the audio, with scores for overlapping stretches, given the emotion."""
     discriminator_channels: int = 128
-    """Width of the discriminator's Transformer."""
+    """Width of the discriminator's layers."""
+    discriminator_rate: float = 1.0
+    """Its learning rate, relative to the generator's."""
+    exchange: bool = False
+    """Whether the adversarial loss also has motions with the emotion features of another clip of the batch, which the
+    discriminator judges with that clip's emotion; only with 'patches' and emotion features."""
     discriminator_layers: int = 2
     discriminator_hidden: tuple[int, ...] = (2048, 1024, 256, 64, 16)
     """Hidden layers after it."""
@@ -114,6 +125,7 @@ class EmotionGestureConfig:
             ("prompter", PROMPTERS),
             ("prompt_space", PROMPT_SPACES),
             ("beat_form", BEAT_FORMS),
+            ("discriminator", DISCRIMINATORS),
         ):
             if getattr(self, name) not in known:
                 raise _refused(name, f"one of {', '.join(known)}", getattr(self, name))
@@ -128,8 +140,12 @@ class EmotionGestureConfig:
                 raise _refused(field.name, "0 or more", value)
             if field.name.endswith("_temperature") and not 0 < value < float("inf"):
                 raise _refused(field.name, "a number above 0", value)
-            if field.type in (int, "int") and field.name != "vae_steps" and value < 1:
+            if field.type in (int, "int") and field.name not in ("vae_steps", "smoothing") and value < 1:
                 raise _refused(field.name, "1 or more", value)
+        if self.smoothing < 0:
+            raise _refused("smoothing", "0 or more", self.smoothing)
+        if not 0 < self.discriminator_rate < float("inf"):
+            raise _refused("discriminator_rate", "a number above 0", self.discriminator_rate)
         if self.vae_steps < 0:
             raise _refused("vae_steps", "0 or more", self.vae_steps)
         if not 0 <= self.dropout < 1:
@@ -155,6 +171,11 @@ class EmotionGestureConfig:
         """Whether there are emotion and beat features."""
         return self.branches == "emotion-beat"
 
+    @property
+    def exchanges(self) -> bool:
+        """Whether emotion features are exchanged."""
+        return self.exchange and self.mines and self.discriminator == "patches"
+
 
 def _refused(name: str, expected: str, value: object) -> InputError:
     return InputError(f"--{name.replace('_', '-')}: expected {expected}; got {value}.")
@@ -179,9 +200,12 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         query_positions=True,
         hold_seed=True,
         normalise_pose=True,
+        smoothing=1,
+        discriminator="patches",
         discriminator_channels=64,
-        discriminator_layers=1,
-        discriminator_hidden=(64,),
+        discriminator_rate=0.5,
+        exchange=True,
+        reconstruction_weight=20.0,
         beat_form="words",
         vae_steps=600,
     ),

@@ -66,12 +66,12 @@ def reconstruction(target: Float[Array, "B N C"], made: Float[Array, "B N C"]) -
     return jnp.mean(jnp.abs(target - made))
 
 
-def generator_adversarial(logits: Float[Array, " B"]) -> Float[Array, ""]:
+def generator_adversarial(logits: Float[Array, " L"]) -> Float[Array, ""]:
     """``-log D`` of generated motion: the generator's side of Eq. 8 in its non-saturating form."""
     return jnp.mean(jax.nn.softplus(-logits))
 
 
-def discriminator_adversarial(real: Float[Array, " B"], fake: Float[Array, " B"]) -> Float[Array, ""]:
+def discriminator_adversarial(real: Float[Array, " L"], fake: Float[Array, " M"]) -> Float[Array, ""]:
     """``-log D`` of true motion and ``-log(1 - D)`` of generated motion: minus Eq. 8."""
     return jnp.mean(jax.nn.softplus(-real)) + jnp.mean(jax.nn.softplus(fake))
 

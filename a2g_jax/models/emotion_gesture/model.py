@@ -1,5 +1,6 @@
 """EmotionGesture as a record of pure functions."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -108,7 +109,10 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
     held_out = generator_loss(networks, False)
     if config.adversarial_weight > 0:
         game = discriminator_loss(networks, True)
-        updates = [Update(game, ("discriminator",), "discriminator", optimiser), *updates]
+        slower = lambda settings: optimiser(  # noqa: E731
+            replace(settings, learning_rate=config.discriminator_rate * settings.learning_rate)
+        )
+        updates = [Update(game, ("discriminator",), "discriminator", slower), *updates]
     stages = [Stage(tuple(updates), validation_loss=held_out)]
     if networks.samples_emotions:
         update = Update(vae_loss(networks), ("vae",), optimiser=_vae_optimiser)

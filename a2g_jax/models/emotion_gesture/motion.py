@@ -7,7 +7,14 @@ from flax import linen as nn
 from jaxtyping import Array, Float
 
 from a2g_jax.models.emotion_gesture.mining import bent, dense
+from a2g_jax.nn.rates import smoothed
+from a2g_jax.nn.strided import StridedConv1D
 from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
+
+#: Factor on the differences between frames beside poses: both are then of order one, in z-scores.
+_SPEED = 4.0
+#: Layers of the patch discriminator that halve time; a score depends on 22 frames.
+_HALVINGS = 3
 
 
 class PoseDecoder(nn.Module):
@@ -16,6 +23,7 @@ class PoseDecoder(nn.Module):
     Args:
         values: numbers of a pose.
         positions: whether prompts get a position encoding.
+        smoothing: binomial filters over time at the end.
     """
 
     layers: int
@@ -23,6 +31,7 @@ class PoseDecoder(nn.Module):
     hidden: int
     values: int
     positions: bool
+    smoothing: int
     dropout: float
 
     @nn.compact
@@ -38,7 +47,7 @@ class PoseDecoder(nn.Module):
         for width in (4 * channels, channels):
             x = nn.Dropout(self.dropout)(bent(dense(width)(x)), deterministic=deterministic)
         poses: Float[Array, "B N C"] = dense(self.values)(dense(self.values)(x))
-        return poses
+        return smoothed(poses, self.smoothing)
 
 
 class SeedHold(nn.Module):
@@ -52,6 +61,28 @@ class SeedHold(nn.Module):
         share = nn.sigmoid(self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2])))[None]
         centre = mean[None, None]
         return jnp.concatenate([seed, centre + share * (seed[:, -1:] - centre)], axis=1)
+
+
+class PatchDiscriminator(nn.Module):
+    """Logits for overlapping stretches of a motion with its audio, given an emotion; positive for recorded ones.
+
+    The emotion enters by a product with the features of a stretch (Miyato and Koyama 2018).
+    """
+
+    channels: int
+
+    @nn.compact
+    def __call__(
+        self, motion: Float[Array, "B N C"], audio: Float[Array, "B N bands"], label: Float[Array, "B E"]
+    ) -> Float[Array, "B _"]:
+        speed = _SPEED * jnp.diff(motion, axis=1, append=motion[:, -1:])
+        sound = dense(self.channels)(audio) / audio.shape[-1] ** 0.5
+        x = bent(dense(self.channels)(jnp.concatenate([motion, speed, sound], axis=-1)))
+        for _ in range(_HALVINGS):
+            x = bent(StridedConv1D(self.channels)(x))
+        shown = nn.Dense(self.channels, use_bias=False, kernel_init=nn.initializers.xavier_uniform())(label)
+        product = jnp.sum(x * shown[:, None], axis=-1) / self.channels**0.5
+        return dense(1)(x)[..., 0] + product
 
 
 class Discriminator(nn.Module):

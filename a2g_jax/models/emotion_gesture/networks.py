@@ -11,7 +11,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.models.base import Data, Params
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder, EmotionClassifier, Projector, TextEncoder, unmined
-from a2g_jax.models.emotion_gesture.motion import Discriminator, PoseDecoder, SeedHold
+from a2g_jax.models.emotion_gesture.motion import Discriminator, PatchDiscriminator, PoseDecoder, SeedHold
 from a2g_jax.models.emotion_gesture.prompter import PosePrompter
 from a2g_jax.models.emotion_gesture.vae import FeatureDecoder, FeatureEncoder
 from a2g_jax.nn.transformer import Encoder
@@ -56,7 +56,7 @@ class Networks:
             "prompter": PosePrompter(
                 c.channels, c.clip_frames, c.transition_frames, c.prompter, c.prompt_space, c.scaled_scores, c.dropout
             ),
-            "decoder": PoseDecoder(c.layers, c.heads, c.hidden, self.values, c.query_positions, c.dropout),
+            "decoder": PoseDecoder(c.layers, c.heads, c.hidden, self.values, c.query_positions, c.smoothing, c.dropout),
         }
         if c.mines:
             modules["emotion"] = Projector(c.channels, c.dropout)
@@ -69,9 +69,11 @@ class Networks:
         self._generator: dict[str, Any] = modules
         mean = np.zeros(self.rows) if self.normalised else np.asarray(data.pose_statistics.mean)
         self._mean = mean.reshape(-1).astype(np.float32)
-        self._discriminator = Discriminator(
+        self._judge: Any = Discriminator(
             c.discriminator_channels, c.discriminator_layers, c.heads, c.discriminator_hidden
         )
+        if c.discriminator == "patches":
+            self._judge = PatchDiscriminator(c.discriminator_channels)
         self._vae_encoder = FeatureEncoder(c.vae_channels, c.vae_latent)
         self._vae_decoder = FeatureDecoder(c.vae_channels, c.clip_frames, c.channels)
         self.samples_emotions = c.mines and c.vae_steps > 0
@@ -102,8 +104,9 @@ class Networks:
             }
         }
         if c.adversarial_weight > 0:
-            offsets = jnp.zeros((1, c.clip_frames - 1, self.values))
-            params["discriminator"] = self._discriminator.init(jax.random.fold_in(key, 100), offsets)["params"]
+            motion = jnp.zeros((1, c.clip_frames, self.values))
+            inputs["judge"] = self._judged(motion, audio, jnp.zeros((1, self.classes)))
+            params["discriminator"] = self._judge.init(jax.random.fold_in(key, 100), *inputs["judge"])["params"]
         if self.samples_emotions:
             label, latent = jnp.zeros((1, self.classes)), jnp.zeros((1, c.vae_latent))
             params["vae"] = {
@@ -162,10 +165,23 @@ class Networks:
             made = made + self._generator["hold"].apply(own, seed, jnp.asarray(self._mean, seed.dtype))
         return made
 
-    def judge(self, params: Params, motion: Float[Array, "B N C"]) -> Float[Array, " B"]:
-        """The discriminator's logits of motions."""
-        logits: Any = self._discriminator.apply({"params": params["discriminator"]}, jnp.diff(motion, axis=1))
-        return logits
+    def judge(
+        self,
+        params: Params,
+        motion: Float[Array, "B N C"],
+        audio: Float[Array, "B N bands"],
+        label: Float[Array, "B E"],
+    ) -> Float[Array, " L"]:
+        """The discriminator's logits of motions, of all clips and stretches."""
+        logits: Any = self._judge.apply({"params": params["discriminator"]}, *self._judged(motion, audio, label))
+        return logits.reshape(-1)
+
+    def _judged(self, motion: Array, audio: Array, label: Array) -> tuple[Array, ...]:
+        """Input of the discriminator; patches begin with the last initial pose, which is given."""
+        if self.config.discriminator == "transformer":
+            return (jnp.diff(motion, axis=1),)
+        first = self.config.seed_frames - 1
+        return motion[:, first:], audio[:, first:], label
 
     def encode_emotion(
         self, params: Params, features: Float[Array, "B N D"], label: Float[Array, "B E"]

@@ -1,6 +1,7 @@
 """The objective of EmotionGesture (Eq. 9) as losses of updates, and that of the emotion-conditioned VAE."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -36,6 +37,36 @@ def generate(
     return audio, networks.decode(params, audio, target[:, : config.seed_frames], labels, key), target
 
 
+class Judged(NamedTuple):
+    """Generated motions as the discriminator gets them."""
+
+    motion: Float[Array, "B2 N C"]
+    audio: Float[Array, "B2 N bands"]
+    label: Float[Array, "B2 E"]
+
+
+def judged(
+    networks: Networks,
+    params: Params,
+    batch: Batch,
+    audio: AudioFeatures,
+    made: Float[Array, "B N C"],
+    key: DropoutKey,
+) -> Judged:
+    """The motions of a batch, and those with the emotion features and the label of the next clip, if exchanged."""
+    label = one_hot(networks, batch)
+    if not networks.config.exchanges or audio.emotion is None:
+        return Judged(made, batch.audio, label)
+    other = audio._replace(emotion=jnp.roll(audio.emotion, 1, axis=0))
+    seed = networks.flat(batch.pose)[:, : networks.config.seed_frames]
+    exchanged = networks.decode(params, other, seed, None, key)
+    return Judged(
+        jnp.concatenate([made, exchanged]),
+        jnp.concatenate([batch.audio] * 2),
+        jnp.concatenate([label, jnp.roll(label, 1, axis=0)]),
+    )
+
+
 def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
     """The generator's loss: Eq. 9 with the generator's side of Eq. 8.
 
@@ -55,7 +86,8 @@ def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Ar
             weights["smooth"] = config.smooth_weight
         if config.adversarial_weight > 0:
             frozen = params | {"discriminator": jax.lax.stop_gradient(params["discriminator"])}
-            terms["adversarial"] = losses.generator_adversarial(networks.judge(frozen, made))
+            fake = judged(networks, frozen, batch, audio, made, dropout)
+            terms["adversarial"] = losses.generator_adversarial(networks.judge(frozen, *fake))
             weights["adversarial"] = config.adversarial_weight
         if audio.logits is not None and config.emotion_weight > 0:
             assert batch.emotion is not None
@@ -87,8 +119,10 @@ def discriminator_loss(networks: Networks, training: bool) -> Callable[..., tupl
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
         del step
         frozen = params | {"generator": jax.lax.stop_gradient(params["generator"])}
-        _, made, target = generate(networks, frozen, batch, key if training else None)
-        real, fake = jnp.split(networks.judge(params, jnp.concatenate([target, made])), 2)
+        dropout = key if training else None
+        audio, made, target = generate(networks, frozen, batch, dropout)
+        real = networks.judge(params, target, batch.audio, one_hot(networks, batch))
+        fake = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout))
         value = losses.discriminator_adversarial(real, fake)
         return value, {"discriminator": value}
 
