@@ -121,7 +121,7 @@ def _settings(run: Run) -> Iterator[tuple[str, ...]]:
             yield from (("--control", f"{name}={value}") for value in named[name])
             continue
         yield from (("--control", f"{name}={value}") for value in (LOW, HIGH))
-        yield "--control", f"{name}={LOW}@0,{HIGH}@6,{LOW}@12"
+        yield "--control", f"{name}={LOW}@0,{HIGH}@5,{LOW}@10"
     if controls:
         yield tuple(part for name in controls.names if name not in named for part in ("--control", f"{name}={HIGH}"))
 
