@@ -27,6 +27,7 @@ from a2g_jax.models.audio2gestures.stored import (
     control_names,
     log_weights,
     stored_steps,
+    widened,
 )
 from a2g_jax.models.base import Data
 from a2g_jax.talker.skeleton import TALKER_SKELETON
@@ -211,3 +212,18 @@ def test_which_runs_have_which_controls():
 def test_wrong_requests_are_named(config, controls, named):
     with pytest.raises(InputError, match=named):
         build(config, DATA, Audio2GesturesSampling(controls=controls))
+
+
+def test_several_narrow_requests_leave_a_choice_and_one_is_not_widened():
+    rng = np.random.default_rng(0)
+    one = jnp.asarray(-0.5 * np.square((rng.uniform(size=2000) - 0.5) / 0.05), jnp.float32)
+    none = jnp.zeros(2000)
+    np.testing.assert_array_equal(widened(one, none), one)
+    corner = jnp.asarray(-0.5 * np.square((rng.uniform(size=(3, 2000)) - 1.0) / 0.05).sum(axis=0), jnp.float32)
+    label = jnp.where(jnp.arange(2000) % 4 == 0, 0.0, -30.0)
+    for others in (none, label):
+        shares = jax.nn.softmax(widened(corner, others) + others)
+        assert 24 <= 1 / jnp.sum(shares**2) < 26
+        assert jnp.sum(jnp.where(others < 0, shares, 0)) < 1e-6
+        assert 1 / jnp.sum(jax.nn.softmax(corner + others) ** 2) < 12
+    np.testing.assert_array_equal(widened(none[:6], none[:6]), none[:6])

@@ -21,6 +21,9 @@ from a2g_jax.io.words import word_id
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import load_run
 
+# The common loop has faster guards (tests/plugin); here the whole model is compiled for each stage.
+pytestmark = pytest.mark.slow
+
 SETTINGS = {
     "channels": 8,
     "heads": 2,
@@ -152,7 +155,6 @@ def test_models_without_seed_poses_refuse_a_seed_clip(speech, tmp_path, capsys):
     assert "--seed-clip: runs of audio2gestures take no seed poses." in capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tmp_path, capsys):
     folder = tmp_path / "corpus"
     shutil.copytree(toy_corpus.path, folder)
@@ -163,7 +165,6 @@ def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tm
     assert main(train(folder, tmp_path / "run", beat_weight=0, steps=2, vae_steps=0)) == 0
 
 
-@pytest.mark.slow
 def test_pretrained_word_vectors_are_where_training_begins(toy_corpus, tmp_path, capsys):
     words = Corpus.open(toy_corpus.path).vocabulary
     assert words == tuple(sorted(set(words)))
@@ -180,7 +181,6 @@ def test_pretrained_word_vectors_are_where_training_begins(toy_corpus, tmp_path,
     assert not (tmp_path / "other").exists()
 
 
-@pytest.mark.slow
 def test_resuming_after_sigkill_in_each_stage_equals_not_having_stopped(toy_corpus, tmp_path):
     settings = {"steps": 40, "vae_steps": 40, "checkpoint_every": 2, "keep_checkpoints": 99}
     folder, whole = tmp_path / "killed", tmp_path / "whole"
@@ -204,7 +204,6 @@ def test_resuming_after_sigkill_in_each_stage_equals_not_having_stopped(toy_corp
     assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
 
 
-@pytest.mark.slow
 def test_it_is_evaluated(run, toy_corpus, tmp_path):
     out = tmp_path / "report"
     command = ["evaluate", str(run), "--corpus", str(toy_corpus.path), "--out", str(out), "--samples", "1"]

@@ -23,6 +23,9 @@ from a2g_jax.models.control_requests import ranks, requested_values
 
 #: Standard deviation s of a request, in quantiles.
 WIDTH = 0.05
+#: Parts of clips that a request leaves to choose from, at least: several narrow requests together are widened, since
+#: samples would be alike if they all drew the one clip that has everything.
+CHOICE = 24.0
 #: Log-weight of clips of another category than the requested one.
 OTHER = -30.0
 #: Frames for which a request holds, so that motion is not cut into pieces shorter than a stroke; a divisor of 128.
@@ -93,11 +96,39 @@ def log_weights(
         clips, requested = (ranks(those[:, column], training[:, column]) for those in (training, values))
         far = -0.5 * jnp.square((clips[None] - requested[:, None]) / WIDTH)
         total += jnp.where(jnp.isnan(requested_rows[:, column])[:, None], 0.0, far)
+    others = jnp.zeros_like(total)
     if EMOTION in names:
         label = requested_rows[:, count, None]
         same = jnp.repeat(jnp.asarray(summary[LABELS]), stored.shape[1])[None] == label
-        total += jnp.where(same | jnp.isnan(label), 0.0, OTHER)
+        others = jnp.where(same | jnp.isnan(label), 0.0, OTHER)
+    total = jax.vmap(widened)(total, others) + others
     return total.reshape(len(requested_rows), *stored.shape[:2])
+
+
+def widened(weights: Float[Array, " M"], others: Float[Array, " M"]) -> Float[Array, " M"]:
+    """Log-weights times the largest factor up to 1 with which at least :data:`CHOICE` parts count, or half of all.
+
+    The number that count is ``(sum w)^2 / sum w^2``.
+
+    Args:
+        weights: of the requested properties.
+        others: of the category, which is not widened.
+    """
+
+    def number(factor: Float[Array, ""]) -> Float[Array, ""]:
+        shares = jax.nn.softmax(factor * weights + others)
+        return 1.0 / jnp.sum(jnp.square(shares))
+
+    least = jnp.minimum(CHOICE, 0.5 * number(jnp.float32(0.0)))
+
+    def halve(_: Any, bounds: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = bounds
+        middle = 0.5 * (low + high)
+        enough = number(middle) >= least
+        return jnp.where(enough, middle, low), jnp.where(enough, high, middle)
+
+    low, _ = jax.lax.fori_loop(0, 16, halve, (jnp.float32(0.0), jnp.float32(1.0)))
+    return weights * jnp.where(number(jnp.float32(1.0)) >= least, 1.0, low)
 
 
 def stored_steps(
