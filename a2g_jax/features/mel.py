@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy import fft, signal
 
+from a2g_jax.features.offset import without_offset
+
 #: Frames transformed at once: bounds memory to about 60 MB for audio of any length.
 _CHUNK = 4096
 
@@ -75,7 +77,7 @@ def log_mel(
 
     The window of frame k is centred on time ``k / fps``, rounded to the nearest sample for every frame, so the features
     never drift from the motion; with a fixed integer hop they would (0.1 s in 166 s at 30 fps and 16 kHz). The audio is
-    padded with zeros.
+    padded with zeros, and a constant offset is removed before (:mod:`a2g_jax.features.offset`).
 
     Args:
         audio: mono samples at ``config.sample_rate``.
@@ -88,7 +90,7 @@ def log_mel(
 def _log_mel_rows(
     audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
 ) -> Float[np.ndarray, "frames bands"]:
-    audio = np.asarray(audio, dtype=np.float32)
+    audio = without_offset(np.asarray(audio, dtype=np.float32), config.sample_rate)
     if config.level_db is not None:
         gain = 10 ** ((config.level_db - active_level_db(audio, config.sample_rate)) / 20)
         audio = audio * np.float32(gain)
