@@ -6,6 +6,11 @@ from typing import Any
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import chosen_formats
+from a2g_jax.io.reading import parse_channel
+
+#: Help of ``--channel`` and ``--tier``.
+CHANNEL = "channel of audio files with several (default: the mean of all)"
+TIER = "tier of TextGrids with several, or the speaker it is of (default: the first tier of words)"
 
 
 def number(kind: Callable[[str], Any], low: float | int, high: float | int, meaning: str) -> Callable[[str], Any]:
@@ -36,6 +41,14 @@ sample_rate = number(int, 8000, 96000, "a whole number from 8000 to 96000")
 frame_rate = number(float, 1, 1000, "a number from 1 to 1000")
 seed = number(int, 0, 2**31 - 1, "a whole number from 0 to 2147483647")
 share = number(float, 0, 1, "a number from 0 to 1")
+
+
+def channel(text: str) -> int:
+    """An argument type for a channel: left, right or a number from 1 on."""
+    try:
+        return parse_channel(text)
+    except InputError:
+        raise argparse.ArgumentTypeError(f"expected left, right or a number from 1 on; got {text!r}") from None
 
 
 def formats(known: tuple[str, ...]) -> Callable[[str], tuple[str, ...]]:

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.cli import sampling
+from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.speech import read_speech
 from a2g_jax.errors import InputError
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
@@ -19,6 +21,7 @@ COMPARED_SAMPLES = 2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g demo``."""
     parser.add_argument("--audio", metavar="FILE", help="your speech (default: a short English one of the package)")
+    parser.add_argument("--channel", type=channel, metavar="left|right|N", help=CHANNEL)
     parser.add_argument("--train", action="store_true", help="train the tiny preset on a generated corpus first")
     parser.add_argument(
         "--compare",
@@ -59,7 +62,6 @@ def _demo(options: argparse.Namespace) -> None:
     from a2g_jax.features.mel import MelConfig
     from a2g_jax.generation.controls import control_rows
     from a2g_jax.generation.generator import Generator, audio_frames
-    from a2g_jax.io.audio import read_audio
     from a2g_jax.talker.demo_speech import demo_speech
     from a2g_jax.training.run import demo_run
 
@@ -68,7 +70,7 @@ def _demo(options: argparse.Namespace) -> None:
     # Bad audio is refused before minutes of training.
     words: Any = ()
     if options.audio is not None:
-        audio, title = read_audio(options.audio, MelConfig().sample_rate), Path(options.audio).name
+        audio, title = read_speech(options.audio, options.channel).at(MelConfig().sample_rate), Path(options.audio).name
     else:
         speech = demo_speech()
         audio, title, words = speech.audio, "the speech of the demo", speech.words
@@ -87,13 +89,12 @@ def _compare(options: argparse.Namespace) -> None:
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.generation.comparison import Speech, compare, demo_speech_with_truth, systems
-    from a2g_jax.io.audio import read_audio
     from a2g_jax.progress import progress_bar
 
     keep_compilations()
     speech = demo_speech_with_truth()
     if options.audio is not None:
-        speech = Speech(Path(options.audio).name, lambda sample_rate: read_audio(options.audio, sample_rate))
+        speech = Speech(Path(options.audio).name, read_speech(options.audio, options.channel).at)
     runs = systems(options.compare)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
         compared = compare(

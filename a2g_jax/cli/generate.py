@@ -5,7 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from a2g_jax.cli import clips, sampling
+from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.speech import read_speech
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
 
@@ -22,7 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run", metavar="RUN", help="a run folder, or 'demo' or 'demo-flow' for those that are shipped with the package"
     )
-    parser.add_argument("--audio", metavar="FILE", help="speech, in any common format")
+    parser.add_argument(
+        "--audio", metavar="FILE", help="speech, in any common format; M4A, AAC, MP4, WebM, WMA and AMR need ffmpeg"
+    )
+    parser.add_argument("--channel", type=channel, metavar="left|right|N", help=CHANNEL)
     parser.add_argument("--out", metavar="DIR", help="folder to write to; files of an earlier call in it are replaced")
     parser.add_argument("--settings", action="store_true", help="list the sampling settings, and exit")
     clips.add_arguments(parser)
@@ -52,14 +57,13 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     clips.check_files(options)
 
     from a2g_jax.compilations import keep_compilations
-    from a2g_jax.io.audio import read_audio
     from a2g_jax.training.run import open_run
 
     keep_compilations()
     opened = open_run(options.run)
     trained = replace(opened, config=replace(opened.config, sampling=settings))
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
-    audio = read_audio(options.audio, trained.config.mel.sample_rate)
+    audio = read_speech(options.audio, options.channel).at(trained.config.mel.sample_rate)
     chosen = clips.sampler_of(trained, audio, options)
     sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **chosen.about)
     for line in chosen.report(Path(options.out)):

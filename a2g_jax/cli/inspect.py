@@ -5,8 +5,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from a2g_jax.cli.argument_types import CHANNEL, TIER, channel
 from a2g_jax.cli.paths import existing_file, existing_run
 from a2g_jax.errors import InputError
+from a2g_jax.io.reading import reading
 from a2g_jax.training.run_file import SHIPPED
 
 if TYPE_CHECKING:
@@ -31,6 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " likely moments; with --json for every frame",
     )
     parser.add_argument("--picture", metavar="FILE.png", help="with --score: plot it over time (needs Matplotlib)")
+    parser.add_argument("--channel", type=channel, metavar="left|right|N", help=CHANNEL)
+    parser.add_argument("--tier", metavar="NAME", help=TIER)
     parser.add_argument("--json", action="store_true", help="print one JSON document")
     parser.add_argument("--strict", action="store_true", help="exit with status 1 if there are warnings")
 
@@ -62,7 +66,7 @@ def _inspect(options: argparse.Namespace) -> "Report":
 
     from a2g_jax.inspection.inspect import inspect
 
-    return inspect(options.path, options.audio)
+    return inspect(options.path, options.audio, channel=options.channel, tier=options.tier)
 
 
 def _score(options: argparse.Namespace) -> "Report":
@@ -78,7 +82,8 @@ def _score(options: argparse.Namespace) -> "Report":
     from a2g_jax.inspection.likelihood import file_likelihood, likelihood_report
 
     motion = Path(options.score)
-    likelihood = file_likelihood(Path(options.path), motion, Path(options.audio))
+    with reading(options.channel):
+        likelihood = file_likelihood(Path(options.path), motion, Path(options.audio))
     if picture is not None:
         # Only here, since Matplotlib is optional.
         from a2g_jax.inspection.likelihood_plot import save_likelihood

@@ -36,6 +36,8 @@ class Prepared:
     """Part of the official split, or empty."""
     sources: tuple[str, ...]
     annotations: dict[str, Any]
+    notes: tuple[str, ...] = ()
+    """What the user should know of it, a sentence each."""
 
 
 @dataclass(frozen=True)

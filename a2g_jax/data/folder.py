@@ -8,10 +8,9 @@ from pathlib import Path
 from a2g_jax.errors import InputError
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.sound_file import AUDIO_SUFFIXES, FFMPEG_SUFFIXES
 from a2g_jax.io.textgrid import read_words
 from a2g_jax.recording import Recording
-
-AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".mp3")
 
 
 def find_pairs(folder: str | os.PathLike[str]) -> list[tuple[Path, Path]]:
@@ -24,7 +23,7 @@ def find_pairs(folder: str | os.PathLike[str]) -> list[tuple[Path, Path]]:
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; name one that holds WAV and BVH files of equal names.")
     files = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
-    sounds = [path for path in files if path.suffix.lower() in AUDIO_SUFFIXES]
+    sounds = find_sounds(files)
     motions = [path for path in files if path.suffix.lower() == ".bvh"]
     if not sounds and not motions:
         raise InputError(f"{folder}: holds no WAV and no BVH files; name a folder that does.")
@@ -41,6 +40,15 @@ def find_pairs(folder: str | os.PathLike[str]) -> list[tuple[Path, Path]]:
         if len(paths) > 1:
             raise InputError(f"{paths[0]} and {paths[1]}: have the same name; rename or remove one.")
     return [(audio_files[name][0], bvh_files[name][0]) for name in sorted(bvh_files)]
+
+
+def find_sounds(files: list[Path]) -> list[Path]:
+    """The audio files; those that need ffmpeg, such as a video beside its WAV, only where there is no other."""
+    sounds = [path for path in files if path.suffix.lower() in AUDIO_SUFFIXES]
+    names = {path.stem for path in sounds}
+    return sorted(
+        sounds + [path for path in files if path.suffix.lower() in FFMPEG_SUFFIXES and path.stem not in names]
+    )
 
 
 def _whole_path(path: Path) -> str:

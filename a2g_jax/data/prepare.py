@@ -20,9 +20,11 @@ from a2g_jax.data.on_demand import OnDemand, split_roles
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError
+from a2g_jax.features.speech_likeness import why_no_speech
 from a2g_jax.geometry.pose_space import interchangeable
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
+from a2g_jax.io.reading import reading
 from a2g_jax.progress import progress_bar, say
 from a2g_jax.recording import PoseRecording, Recording
 from a2g_jax.talker.views.catalogue import find_view
@@ -88,6 +90,8 @@ def prepare_data_set(
     labelled: bool = False,
     workers: int | None = None,
     skeleton: Skeleton | None = None,
+    channel: int | None = None,
+    tier: str | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
@@ -104,6 +108,8 @@ def prepare_data_set(
         labelled: leave out recordings without an emotion, and note them in the manifest.
         workers: number of processes; one for every core if None.
         skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
+        channel: of audio files with several, from 1 on; the mean of all if None.
+        tier: of TextGrids with several, or the speaker it is of; the first one of words if None.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
@@ -122,10 +128,18 @@ def prepare_data_set(
         )
     if labelled:
         recipe["labelled"] = True
+    recipe |= {name: value for name, value in (("channel", channel), ("tier", tier)) if value is not None}
     if skeleton is not None:
         recipe["body"] = skeleton_to_json(skeleton)
     read = partial(
-        _read_rows, name=name, features=features, skip_broken=skip_broken, labelled=labelled, skeleton=skeleton
+        _read_rows,
+        name=name,
+        features=features,
+        skip_broken=skip_broken,
+        labelled=labelled,
+        skeleton=skeleton,
+        channel=channel,
+        tier=tier,
     )
     items = [Item(take.name, take.sources) for take in takes]
     groups = {take.name: take.group for take in takes if take.group}
@@ -191,6 +205,8 @@ def make_rows(
             )
             rows = in_order(pool, work, rest, 2 * count + 2)
         for prepared in rows:
+            for note in getattr(prepared, "notes", ()):
+                say(note)
             yield prepared
             bar.update()
 
@@ -210,13 +226,24 @@ def read_take(take: Take, name: str, sample_rate: int) -> Recording | PoseRecord
 
 
 def _read_rows(
-    take: Take, name: str, features: Features, skip_broken: bool, labelled: bool, skeleton: Skeleton | None
+    take: Take,
+    name: str,
+    features: Features,
+    skip_broken: bool,
+    labelled: bool,
+    skeleton: Skeleton | None,
+    channel: int | None = None,
+    tier: str | None = None,
 ) -> Prepared | Skipped:
     try:
-        recording = read_take(take, name, features.mel.sample_rate)
+        with reading(channel, tier) as choices:
+            recording = read_take(take, name, features.mel.sample_rate)
         if labelled and not recording.emotion:
             return Skipped(take.name, take.sources, f"{take.sources[0]}: has no emotion label.")
-        return prepare_recording(recording, features, take.split, skeleton)
+        if reason := why_no_speech(recording.audio, recording.sample_rate):
+            choices.notes.append(f"{take.sources[0]}: no speech is found: {reason}.")
+        prepared = prepare_recording(recording, features, take.split, skeleton)
+        return replace(prepared, notes=(*choices.notes, *prepared.notes))
     except InputError as error:
         if not skip_broken:
             raise

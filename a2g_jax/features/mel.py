@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy import fft, signal
 
 from a2g_jax.features.offset import without_offset
+from a2g_jax.features.samples import mono_samples
 
 #: Frames transformed at once: bounds memory to about 60 MB for audio of any length.
 _CHUNK = 4096
@@ -82,6 +83,9 @@ def log_mel(
     Args:
         audio: mono samples at ``config.sample_rate``.
         frames: number of rows; motion of the same length has ``round(seconds * fps)``.
+
+    Raises:
+        InputError: several channels, or NaN.
     """
     rows = _log_mel_rows(audio, config, fps * config.stack, frames * config.stack)
     return rows.reshape(frames, config.width)
@@ -90,7 +94,7 @@ def log_mel(
 def _log_mel_rows(
     audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
 ) -> Float[np.ndarray, "frames bands"]:
-    audio = without_offset(np.asarray(audio, dtype=np.float32), config.sample_rate)
+    audio = without_offset(mono_samples(audio), config.sample_rate)
     if config.level_db is not None:
         gain = 10 ** ((config.level_db - active_level_db(audio, config.sample_rate)) / 20)
         audio = audio * np.float32(gain)

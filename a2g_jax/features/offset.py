@@ -11,13 +11,15 @@ _FEWEST = 20
 #: 0.11 degrees at most (``demo`` and ``demo-flow``, three speeches), and ordinary recordings, most of whose offsets
 #: are 60 to 100 dB below speech, keep their bits.
 _BELOW = 55.0
+#: Standard errors that an offset is away from zero; the mean of noise is not zero by chance.
+_CERTAIN = 4.0
 
 
 def sample_offset(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
     """The offset of samples: the median of the means of 25 ms blocks; 0 if it is too small to matter.
 
-    The mean of all samples is not zero for speech, whose waveform is asymmetric. Blocks of digital silence do not count.
-    Adding a constant to the samples adds it to the median.
+    The mean of all samples is not zero for speech, whose waveform is asymmetric. Blocks of digital silence do not
+    count. Adding a constant to the samples adds it to the median.
     """
     size = max(1, int(_BLOCK * sample_rate))
     count = len(audio) // size
@@ -30,8 +32,11 @@ def sample_offset(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
     sounding = power > 0
     if not sounding.any():
         return 0.0
-    offset = float(np.median(means[sounding]))
-    if offset == 0.0:
+    rest = means[sounding]
+    offset = float(np.median(rest))
+    # Standard error of the median of a normal sample, from its median absolute deviation.
+    error = 1.2533 * 1.4826 * float(np.median(np.abs(rest - offset))) / np.sqrt(len(rest))
+    if offset == 0.0 or abs(offset) < _CERTAIN * error:
         return 0.0
     # Power around the offset, of the loud blocks.
     around = np.maximum(power[sounding] - 2 * offset * means[sounding] + offset**2, 0)

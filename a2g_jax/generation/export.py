@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
-from a2g_jax.generation.generator import Sampler, audio_frames
+from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import make_folder, write_json
 from a2g_jax.io.words import Word
@@ -34,6 +34,7 @@ def export(
     words: Sequence[Word] = (),
     lanes: Sequence[Track] = (),
     report: Callable[[int], None] = lambda done: None,
+    sample_rate: int | None = None,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
@@ -43,12 +44,13 @@ def export(
     Args:
         run: the sampler's.
         sampler: a ``Checked`` one is used as it is; with ``strict``, nothing is written before all samples are good.
-        audio: mono, at the run's sample rate.
+        audio: mono.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
         label: description of the sampler, for the page's subtitle.
         lanes: further tracks of the page's timeline.
         report: called with the number of samples done: with ``strict`` once they are checked, else once written.
+        sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
 
     Returns:
         How many files of each format were written.
@@ -57,6 +59,7 @@ def export(
         InputError: a folder that cannot be used, audio shorter than a frame, too large a page, or a motion that is
             refused. Without ``strict``, those before it stay in the folder, and ``checks.json`` has the findings.
     """
+    audio = speech_at_rate(run, audio, sample_rate)
     if PAGE in formats:
         check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)

@@ -8,11 +8,14 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
+from a2g_jax.features.offset import without_offset
+from a2g_jax.features.samples import mono_samples
 from a2g_jax.generation.engine import WINDOW, Engine, Rows
 from a2g_jax.geometry.footholds import lock_feet
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.io.audio import resampled
 from a2g_jax.models.base import Condition
 from a2g_jax.models.control_curves import check_ends
 from a2g_jax.training.run import Run
@@ -43,9 +46,9 @@ class Generator:
         self.run = run
         self.engine = Engine(run, window)
 
-    def frames(self, audio: Audio) -> int:
+    def frames(self, audio: Audio, sample_rate: int | None = None) -> int:
         """Length of the motion for an audio: its seconds times fps, rounded."""
-        return audio_frames(self.run, audio)
+        return audio_frames(self.run, audio, sample_rate)
 
     def check(self, audio: Audio) -> None:
         """Refuse sampling settings that do not fit an audio, before any work.
@@ -63,6 +66,8 @@ class Generator:
         samples: int,
         seed: int = 0,
         report: Callable[[int], None] = lambda done: None,
+        *,
+        sample_rate: int | None = None,
         **given: Any,
     ) -> list[Motion]:
         """Different motions for the same speech.
@@ -70,28 +75,34 @@ class Generator:
         Sample k depends on the audio, the run, the seed and k alone, not on how many samples are requested.
 
         Args:
-            audio: mono, at the run's sample rate.
+            audio: mono: floating-point numbers in -1 to 1, or integers of full scale.
             samples: how many.
             seed: of everything random.
             report: called with the number of samples done.
+            sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
             given: further fields of :class:`~a2g_jax.models.base.Condition` that the model uses.
 
         Raises:
-            InputError: the audio is shorter than a frame, or conditioning that the model does not use.
+            InputError: the audio has several channels or is shorter than a frame, or conditioning that the model does
+                not use.
         """
         motions = []
-        for number, motion in enumerate(self.stream(audio, samples, seed, **given), start=1):
+        stream = self.stream(audio, samples, seed, sample_rate=sample_rate, **given)
+        for number, motion in enumerate(stream, start=1):
             motions.append(motion)
             report(number)
         return motions
 
-    def stream(self, audio: Audio, samples: int, seed: int = 0, **given: Any) -> Iterator[Motion]:
+    def stream(
+        self, audio: Audio, samples: int, seed: int = 0, *, sample_rate: int | None = None, **given: Any
+    ) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one at a time."""
+        audio = speech_at_rate(self.run, audio, sample_rate)
         if given.get("controls") is None:
             check_ends(self.engine.lines, self.frames(audio), self.run.config.fps)
         features = speech_features(self.run, audio)
         if "waveform" in self.engine.model.condition_fields:
-            given.setdefault("waveform", np.asarray(audio, np.float32))
+            given.setdefault("waveform", without_offset(audio, self.run.config.mel.sample_rate))
         yield from self.stream_features(features, samples, seed, **given)
 
     def stream_features(
@@ -112,17 +123,48 @@ class Generator:
         yield from self.engine.rows(Condition(audio, **given), samples, seed)
 
 
-def audio_frames(run: Run, audio: Audio) -> int:
-    """Length of a run's motion for an audio: its seconds times fps, rounded."""
-    return round(len(audio) / run.config.mel.sample_rate * run.config.fps)
+def speech_at_rate(run: Run, audio: Any, sample_rate: int | None) -> Audio:
+    """Mono samples at a run's rate.
 
-
-def speech_features(run: Run, audio: Audio) -> Float[np.ndarray, "T bands"]:
-    """Log-mel features of speech at a run's frames, not normalised.
+    Args:
+        audio: an array, see :func:`~a2g_jax.features.samples.mono_samples`.
+        sample_rate: of the audio, Hz; None for the run's.
 
     Raises:
-        InputError: the audio is shorter than a frame.
+        InputError: several channels, NaN, or a rate that is not a positive number.
     """
+    samples = mono_samples(audio)
+    if sample_rate is None:
+        return samples
+    if not 1000 <= sample_rate <= 1_000_000:
+        raise InputError(f"sample_rate: expected 1000 to 1000000 Hz; got {sample_rate}.")
+    if len(samples) == 0:
+        return samples
+    return resampled(without_offset(samples, int(sample_rate)), int(sample_rate), run.config.mel.sample_rate)
+
+
+def audio_frames(run: Run, audio: Audio, sample_rate: int | None = None) -> int:
+    """Length of a run's motion for an audio: its seconds times fps, rounded.
+
+    Raises:
+        InputError: the audio has several channels.
+    """
+    samples = mono_samples(audio)
+    if sample_rate is not None:
+        samples = speech_at_rate(run, samples, sample_rate)
+    return round(len(samples) / run.config.mel.sample_rate * run.config.fps)
+
+
+def speech_features(run: Run, audio: Audio, sample_rate: int | None = None) -> Float[np.ndarray, "T bands"]:
+    """Log-mel features of speech at a run's frames, not normalised.
+
+    Args:
+        sample_rate: of the audio, Hz; None for the run's.
+
+    Raises:
+        InputError: the audio has several channels, or is shorter than a frame.
+    """
+    audio = speech_at_rate(run, audio, sample_rate)
     frames = audio_frames(run, audio)
     if frames == 0:
         raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")

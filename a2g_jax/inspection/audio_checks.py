@@ -1,23 +1,24 @@
-"""Faults of a speech recording alone: clipping, silence, a constant offset, too low a level."""
+"""Faults of a speech recording alone: clipping, silence, no speech, a constant offset, too low a level, channels."""
 
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.features.mel import active_level_db
+from a2g_jax.features.offset import sample_offset, without_offset
+from a2g_jax.features.speech_likeness import why_no_speech
 from a2g_jax.inspection.finding import Finding, Place
+from a2g_jax.io.audio import Sound
+from a2g_jax.io.reading import Note
+from a2g_jax.io.sound_notes import CLIPPED_SHARE
 
 #: Consecutive samples at the largest value that make a clipped peak; a peak of speech has one or two.
 CLIPPED_RUN = 3
 #: Relative distance from the largest value within which a sample counts as clipped; a dithered 16-bit converter strays
 #: by less.
 CLIPPED_WITHIN = 1e-3
-#: Share of clipped samples from which distortion is audible; below it a few plosives hit the limit.
-CLIPPED_SHARE = 1e-4
 #: Seconds without speech, and decibels below the level of speech that count as silence. Pauses of a talking person
 #: last 2 to 4 s at most.
 SILENT_SECONDS, SILENT_BELOW = 5.0, 40.0
-#: A constant offset this many decibels below the level of speech shifts every window's lowest band.
-OFFSET_BELOW = 26.0
 #: Level of active speech, dB of full scale, below which 16-bit rounding and hum matter.
 FAINT = -50.0
 _BLOCK = 0.025
@@ -51,6 +52,7 @@ def check_clipping(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Fin
 
 def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
     """Long stretches far below the level of speech."""
+    audio = without_offset(audio, sample_rate)
     size = int(_BLOCK * sample_rate)
     count = len(audio) // size
     if count == 0:
@@ -68,22 +70,46 @@ def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Find
 
 
 def check_level(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
-    """A constant offset of the samples, and speech that is too faint."""
-    level, offset = active_level_db(audio, sample_rate), abs(float(np.mean(audio, dtype=np.float64)))
+    """A constant offset of the samples, which is removed before features are computed, and speech that is too faint."""
+    offset = sample_offset(audio, sample_rate)
+    level = active_level_db(without_offset(audio, sample_rate), sample_rate)
     findings = []
-    if 20 * np.log10(max(offset, 1e-9)) > level - OFFSET_BELOW:
-        message = f"the samples are off zero by {offset:.4f} on average."
-        findings.append(Finding("warning", "dc", message, "Remove the offset with a high-pass filter.", value=offset))
+    if offset != 0.0:
+        message = f"the samples are off zero by {offset:.4f} on average; the offset is removed when they are read."
+        findings.append(Finding("info", "dc", message, value=abs(offset)))
     if level < FAINT:
         message = f"speech has a level of only {level:.0f} dB of full scale."
         findings.append(Finding("warning", "faint", message, "Record at a higher level.", value=level))
     return findings
 
 
+def check_speech(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+    """Whether there is speech at all."""
+    reason = why_no_speech(audio, sample_rate)
+    fix = "Name a recording of speech; motion follows whatever sound there is."
+    return [Finding("warning", "no-speech", f"no speech is found: {reason}.", fix)] if reason else []
+
+
 def check_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
-    """All checks of a speech recording alone."""
+    """All checks of the samples of a speech recording alone."""
     return [
         *check_clipping(audio, sample_rate),
         *check_silence(audio, sample_rate),
         *check_level(audio, sample_rate),
+        *check_speech(audio, sample_rate),
     ]
+
+
+def check_sound(sound: Sound) -> list[Finding]:
+    """All checks of an audio file: header, channels and samples."""
+    return [*map(finding_of, sound.notes()), *check_audio(sound.samples, sound.info.sample_rate)]
+
+
+def speech_warnings(sound: Sound) -> list[Finding]:
+    """Warnings that matter before motion is generated; pauses and offsets do not."""
+    return [one for one in check_sound(sound) if one.severity == "warning" and one.code != "silence"]
+
+
+def finding_of(note: Note) -> Finding:
+    """A remark of a reader as a warning."""
+    return Finding("warning", note.code, note.message, note.fix, Place(seconds=note.seconds), note.value)

@@ -11,7 +11,7 @@ from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
-from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.audio_checks import check_sound, finding_of
 from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_first_frames, scan_bvh
 from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
 from a2g_jax.inspection.finding import Finding, Place, located
@@ -26,14 +26,16 @@ from a2g_jax.inspection.sync import (
     wrist_positions,
 )
 from a2g_jax.inspection.tree import skeleton_facts
-from a2g_jax.io.audio import audio_info, read_audio
+from a2g_jax.io.audio import load_audio
 from a2g_jax.io.npz import read_motion_npz
-from a2g_jax.io.transcripts import read_transcript
+from a2g_jax.io.reading import current_reading
+from a2g_jax.io.sound_file import AUDIO_SUFFIXES, FFMPEG_SUFFIXES
+from a2g_jax.io.transcripts import transcript_notes
 from a2g_jax.io.untrusted import read_npz
 from a2g_jax.io.words import Word
 
 SAMPLE_RATE = 16000
-AUDIO = (".wav", ".flac", ".ogg", ".mp3", ".aiff", ".aif", ".au", ".w64", ".caf", ".opus")
+AUDIO = (*AUDIO_SUFFIXES, *FFMPEG_SUFFIXES)
 TRANSCRIPTS = (".textgrid", ".json", ".tsv")
 #: Seconds by which the last word of a transcript may end after the audio; aligners round.
 _WORDS_BEYOND = 0.25
@@ -67,8 +69,9 @@ def inspect_file(path: Path) -> Inspected:
     if suffix in AUDIO:
         return inspect_audio(path)
     if suffix in TRANSCRIPTS:
-        words = read_transcript(path)
-        return Inspected(str(path), "transcript", {"words": word_facts(words)}, words=words)
+        words, notes = transcript_notes(path)
+        findings = located([finding_of(note) for note in notes], path=str(path))
+        return Inspected(str(path), "transcript", {"words": word_facts(words)}, findings, words=words)
     kinds = ", ".join((".bvh", ".npz", *AUDIO[:4], *TRANSCRIPTS))
     raise InputError(f"{path}: cannot be inspected; expected {kinds}, a folder, a corpus or a run.")
 
@@ -106,7 +109,10 @@ def _with_motion(path: Path, kind: str, motion: Motion, facts: dict[str, Any]) -
 
 def inspect_audio(path: Path) -> Inspected:
     """Inspect a speech recording."""
-    info = audio_info(path)
+    # At its own rate, since resampling smooths clipped peaks.
+    choices = current_reading()
+    sound = load_audio(path, channel=choices.channel)
+    info = sound.info
     facts: dict[str, Any] = {
         "file": {
             "sample rate (Hz)": info.sample_rate,
@@ -115,11 +121,11 @@ def inspect_audio(path: Path) -> Inspected:
             "format": f"{info.format} {info.subtype}",
         }
     }
-    # At its own rate, since resampling smooths clipped peaks.
-    audio = read_audio(path, info.sample_rate)
-    facts["audio"] = audio_facts(audio, info.sample_rate)
-    findings = located(check_audio(audio, info.sample_rate), path=str(path))
-    return Inspected(str(path), "audio", facts, findings, audio=read_audio(path, SAMPLE_RATE))
+    if choices.channel is not None:
+        facts["file"]["channel"] = choices.channel
+    facts["audio"] = audio_facts(sound.samples, info.sample_rate)
+    findings = located(check_sound(sound), path=str(path))
+    return Inspected(str(path), "audio", facts, findings, audio=sound.at(SAMPLE_RATE))
 
 
 def inspect_npz(path: Path) -> Inspected:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.data.folder import AUDIO_SUFFIXES, find_pairs
+from a2g_jax.data.folder import find_pairs, find_sounds
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.inspection.copies import Fingerprint, audio_fingerprint, check_copies, motion_fingerprint
@@ -52,8 +52,8 @@ def _find(folder: Path) -> tuple[list[tuple[str, list[Path]]], list[Finding]]:
         pairs = find_pairs(folder)
         return [(str(bvh.relative_to(folder).with_suffix("")), [bvh, audio]) for audio, bvh in pairs], []
     except InputError as error:
-        files = [path for path in sorted(folder.rglob("*"))
-                 if path.suffix.lower() in (".bvh", *AUDIO_SUFFIXES) and not path.name.startswith(".")]  # fmt: skip
+        files = [path for path in sorted(folder.rglob("*")) if not path.name.startswith(".")]
+        files = sorted([*find_sounds(files), *(path for path in files if path.suffix.lower() == ".bvh")])
         if not files:
             raise
         found = Finding("warning", "pairs", str(error), "Until then each file is inspected alone.")

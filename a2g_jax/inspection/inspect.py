@@ -10,20 +10,34 @@ from a2g_jax.inspection.files import Inspected, inspect_file, inspect_together
 from a2g_jax.inspection.folders import inspect_folder
 from a2g_jax.inspection.report import Report
 from a2g_jax.inspection.runs import inspect_run
+from a2g_jax.io.reading import reading
 from a2g_jax.training.run_file import RUN_FILE, SHIPPED
 
 
-def inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None = None) -> Report:
+def inspect(
+    name: str | os.PathLike[str],
+    audio: str | os.PathLike[str] | None = None,
+    *,
+    channel: int | None = None,
+    tier: str | None = None,
+) -> Report:
     """Facts about a file, a folder of recordings, a corpus or a run, and its likely faults.
 
     Args:
         name: path of the file or folder, or the name of a run that comes with the package: ``"demo"`` or
             ``"demo-flow"``. ``"./demo"`` is a folder of that name.
         audio: the speech that belongs to a motion or a transcript.
+        channel: of audio files, from 1 on; None for the mean of all.
+        tier: of TextGrids, its name or the speaker's; None for the first one of words.
 
     Raises:
         InputError: no such file or folder, or one of an unknown kind.
     """
+    with reading(channel, tier):
+        return _inspect(name, audio)
+
+
+def _inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None) -> Report:
     path = Path(name)
     if name in SHIPPED or path.is_dir():
         if audio is not None:

@@ -17,7 +17,7 @@ from a2g_jax.io.sound_notes import sound_notes
 
 #: Peak below which a recording counts as silent: -70 dB of full scale, or -120 dB for samples of 24 bits and more.
 SILENCE = 10 ** (-70 / 20)
-_FINE_SILENCE = 1e-6
+FINE_SILENCE = 1e-6
 _FINE = ("PCM_24", "PCM_32", "FLOAT", "DOUBLE", "ALAC_24", "ALAC_32")
 #: Peak above which floating-point samples cannot be audio in -1 to 1 that was merely mixed too loud.
 _LOUDEST = 100.0
@@ -27,8 +27,6 @@ _EXACT = ("WAV", "WAVEX", "RF64", "W64", "FLAC", "AIFF", "AU", "CAF")
 #: Longest recording, seconds.
 MAX_SECONDS = 4 * 3600.0
 _UNKNOWN_LENGTH = 2**63 - 1
-
-
 
 
 @dataclass(frozen=True)
@@ -135,9 +133,7 @@ def resampled(samples: Float[np.ndarray, " N"], rate: int, sample_rate: int) -> 
     return np.pad(result, (0, length - len(result)))
 
 
-def load_audio(
-    path: str | os.PathLike[str], *, channel: int | None = None, max_seconds: float = MAX_SECONDS
-) -> Sound:
+def load_audio(path: str | os.PathLike[str], *, channel: int | None = None, max_seconds: float = MAX_SECONDS) -> Sound:
     """Read an audio file at its own rate, with what is known of it.
 
     Args:
@@ -187,8 +183,11 @@ def load_audio(
                 meter.add(block, mixed)
             blocks.append(mixed)
         info = AudioInfo(rate, channels, count, format, sound.subtype)
+        header = header or getattr(sound, "remark", "")
     if count == 0:
-        raise InputError(f"{path}: contains no samples: nothing follows its header; take another copy, or export it again.")
+        raise InputError(
+            f"{path}: contains no samples: nothing follows its header; take another copy, or export it again."
+        )
     if format in _EXACT and claimed != _UNKNOWN_LENGTH and count < claimed:
         raise InputError(
             f"{path}: is cut short: the header says {claimed / rate:.2f} s and {count / rate:.2f} s can be read; "
@@ -208,14 +207,12 @@ def _check_level(sound: Sound) -> None:
     if peak > _LOUDEST:
         raise InputError(f"{path}: has samples as large as {peak:.4g}; scale them to -1 to 1.")
     fine = sound.info.subtype in _FINE and sound.info.format != "FFMPEG"
-    limit, decibels = (_FINE_SILENCE, -120) if fine else (SILENCE, -70)
+    limit, decibels = (FINE_SILENCE, -120) if fine else (SILENCE, -70)
     if peak >= limit and np.max(np.abs(without_offset(sound.samples, sound.info.sample_rate))) >= limit:
         return
     if sound.channels is not None and np.sqrt(sound.channels.power.max(initial=0.0)) >= limit:
         raise InputError(f"{path}: is silent as mono, because its channels cancel out; choose one with --channel.")
-    raise InputError(
-        f"{path}: is silent (its peak is below {decibels} dB of full scale); check the recording."
-    )
+    raise InputError(f"{path}: is silent (its peak is below {decibels} dB of full scale); check the recording.")
 
 
 def write_audio(
@@ -252,4 +249,6 @@ def write_audio(
         try:
             soundfile.write(str(temporary), samples, sample_rate, subtype=subtype, format=format)
         except soundfile.LibsndfileError as error:
-            raise InputError(f"{path}: cannot be written ({reason_of(error)}); check the rate and the folder.") from None
+            raise InputError(
+                f"{path}: cannot be written ({reason_of(error)}); check the rate and the folder."
+            ) from None

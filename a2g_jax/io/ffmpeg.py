@@ -1,5 +1,6 @@
 """Sound of files that libsndfile does not read, by the program ffmpeg where it is installed."""
 
+import re
 import shlex
 import shutil
 import struct
@@ -19,7 +20,7 @@ from a2g_jax.errors import InputError
 KINDS = {
     ".m4a": "MPEG-4 audio", ".m4b": "MPEG-4 audio", ".mp4": "an MPEG-4 video", ".m4v": "an MPEG-4 video",
     ".mov": "a QuickTime video", ".3gp": "a 3GP recording", ".aac": "AAC audio", ".webm": "a WebM recording",
-    ".mkv": "a Matroska video", ".mka": "Matroska audio", ".wma": "Windows Media audio", ".wmv": "a Windows Media video",
+    ".mkv": "a Matroska video", ".mka": "Matroska audio", ".wma": "Windows Media audio", ".wmv": "Windows Media video",
     ".asf": "a Windows Media file", ".amr": "an AMR recording", ".awb": "an AMR recording", ".ac3": "AC-3 audio",
     ".ape": "Monkey's Audio", ".wv": "WavPack audio", ".avi": "an AVI video",
 }  # fmt: skip
@@ -54,6 +55,18 @@ def ffmpeg_kind(path: Path, head: bytes) -> str:
     return KINDS.get(path.suffix.lower(), "")
 
 
+def conversion(path: Path, suffix: str = "") -> str:
+    """The command that converts a file to WAV.
+
+    Args:
+        suffix: of the new file's name.
+    """
+    target = path.with_name(f"{path.stem}{suffix}.wav")
+    if target.name == path.name:
+        target = path.with_name(f"{path.stem}_converted.wav")
+    return f"ffmpeg -i {shlex.quote(str(path))} {shlex.quote(str(target))}"
+
+
 class FfmpegSound:
     """Samples of a file, decoded by ffmpeg and read from a pipe; the interface of ``soundfile.SoundFile``."""
 
@@ -72,10 +85,11 @@ class FfmpegSound:
         """
         program = shutil.which("ffmpeg")
         if program is None:
-            command = f"ffmpeg -i {shlex.quote(path.name)} {shlex.quote(path.stem + '.wav')}"
-            raise InputError(f"{path}: is {kind}, which needs ffmpeg; install it, or convert the file: {command}.")
+            raise InputError(
+                f"{path}: is {kind}, which needs ffmpeg; install it, or convert the file: {conversion(path)}"
+            )
         self.path = path
-        self._errors: IO[bytes] = tempfile.TemporaryFile()
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (closed by close)
         # "file:" and the whitelist: a list of other files or addresses inside the file is not followed.
         self._process = subprocess.Popen(
             [
@@ -115,8 +129,13 @@ class FfmpegSound:
         self._check_end()
         raise InputError(f"{self.path}: holds no sound that ffmpeg can decode; convert it to WAV.")
 
-    def read(self, frames: int, dtype: str = "float32", always_2d: bool = True) -> Float[np.ndarray, "n C"]:
-        """The next samples; none at the end.
+    def read(
+        self,
+        frames: int,
+        dtype: str = "float32",  # noqa: ARG002 (of soundfile's interface)
+        always_2d: bool = True,  # noqa: ARG002
+    ) -> Float[np.ndarray, "n C"]:
+        """The next samples, float32; none at the end.
 
         Raises:
             InputError: ffmpeg failed.
@@ -140,10 +159,23 @@ class FfmpegSound:
         if self._late:
             raise InputError(f"{self.path}: ffmpeg did not finish within {_TIMEOUT:.0f} s; convert it to WAV.")
         if code:
-            self._errors.seek(0)
-            lines = self._errors.read(4096).decode("utf-8", "replace").strip().splitlines()
-            reason = " ".join(lines[-1].split())[:200].rstrip(".") if lines else f"exit status {code}"
-            raise InputError(f"{self.path}: cannot be decoded by ffmpeg ({reason}); export it again as WAV.")
+            reason = self._first_error() or f"exit status {code}"
+            if "matches no streams" in reason:
+                raise InputError(f"{self.path}: holds no sound, only other streams; name a file with speech.")
+            raise InputError(f"{self.path}: cannot be decoded by ffmpeg ({reason}); export it again, or as WAV.")
+
+    def _first_error(self) -> str:
+        self._errors.seek(0)
+        lines = self._errors.read(4096).decode("utf-8", "replace").strip().splitlines()
+        # Without the decoder's name and address, such as "[mov,mp4,m4a @ 0x5581a0]".
+        first = re.sub(r"^(\[[^]]* @ 0x[0-9a-f]+\] *)+", "", " ".join(lines[0].split())) if lines else ""
+        return first[:200].rstrip(".")
+
+    @property
+    def remark(self) -> str:
+        """What ffmpeg reported although it decoded the file, once all is read."""
+        reason = self._first_error()
+        return f"ffmpeg reports: {reason}." if reason else ""
 
     def _stop_late(self) -> None:
         self._late = True

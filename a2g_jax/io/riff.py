@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.ffmpeg import conversion
 
 #: Sizes from here on are placeholders if the file is shorter: of programs that write to a pipe, or that write the
 #: size when they finish.
@@ -43,8 +44,8 @@ class Layout:
 def wav_layout(path: Path) -> Layout | None:
     """The layout of a WAV file (RIFF, RF64 or BW64); None for another kind of file.
 
-    A header that was never finished (a data size of 0 bytes or a placeholder, samples behind the end that it states) gets
-    the size that the file has.
+    A header that was never finished (a data size of 0 or a placeholder, samples behind the end that it states)
+    gets the size that the file has.
 
     Raises:
         InputError: cut short, or without samples or a format.
@@ -95,7 +96,7 @@ def _checked(path: Path, file: BinaryIO, layout: Layout, length: int) -> Layout:
             seconds = there / max(_bytes_a_second(layout.form), 1)
             raise InputError(
                 f"{path}: is cut short: the header says {claimed} bytes of samples and the file has {there}"
-                f" ({seconds:.2f} s); copy it again, or keep what is there: ffmpeg -i {path.name} whole.wav."
+                f" ({seconds:.2f} s); copy it again, or keep what is there: {conversion(path, '_whole')}"
             )
         return _finished(layout, there, "a placeholder as its size")
     if claimed == 0 and there and not _is_chunks(file, layout.start, length):

@@ -1,5 +1,6 @@
 """Audio files opened by whatever reads them: libsndfile, ffmpeg, or libsndfile with a repaired header."""
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -56,7 +57,7 @@ def _soundfile(path: Path, head: bytes, file: Any = None) -> Any:
             raise InputError(
                 f"{path}: its header was never written (zeros); samples may follow in the other"
                 f" {path.stat().st_size - 44} bytes. With the recorder's rate and channels: ffmpeg"
-                f" -skip_initial_bytes 44 -f s16le -ar 48000 -ac 1 -i {path.name} whole.wav."
+                f" -skip_initial_bytes 44 -f s16le -ar 48000 -ac 1 -i {shlex.quote(str(path))} whole.wav"
             ) from None
         else:
             reason = f"is not audio that can be read ({reason_of(error)})"
@@ -75,5 +76,3 @@ def reason_of(error: Exception) -> str:
     """The message of an error of libsndfile on one line."""
     text = getattr(error, "error_string", None) or str(error)
     return " ".join(text.split()).rstrip(".")
-
-

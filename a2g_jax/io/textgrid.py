@@ -13,10 +13,12 @@ from typing import NoReturn
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path, check_readable
-from a2g_jax.io.words import Word
+from a2g_jax.io.reading import Note, current_reading
+from a2g_jax.io.word_tiers import Tier, choose_tier, is_other_tier, word_notes
+from a2g_jax.io.words import Word, is_word
 
-#: Labels that aligners write for silence.
-_SILENCES = frozenset({"", "sil", "sp", "<sil>", "<eps>", "<p:>"})
+#: Labels that aligners write for silence between phones; other marks of phones look like the brackets of words.
+_SILENCES = frozenset({"sil", "sp", "<sil>", "<eps>", "<p:>"})
 _TOKEN = re.compile(r'"(?:[^"]|"")*+"|"|![^\n]*|[^\s"]++|\n')
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
@@ -24,28 +26,38 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 def read_words(path: str | os.PathLike[str], tier: str | None = None) -> tuple[Word, ...]:
     """Read the words of a TextGrid (long or short text form, UTF-8 or UTF-16).
 
-    Empty intervals and the usual marks for silence (``sil``, ``sp``, ``<eps>`` ...) are left out.
+    Empty intervals, silence, noise and unknown words are left out (:func:`~a2g_jax.io.words.is_word`). Remarks, such as
+    on a second speaker, go to the enclosing :func:`~a2g_jax.io.reading.reading`.
 
     Args:
         path: the file.
-        tier: name of the interval tier. None chooses one whose name ends with ``words`` or ``word`` (such as
-            ``speaker - words``), otherwise the first interval tier.
+        tier: name of the interval tier, or of a speaker whose words are in one. None takes the choice of
+            :func:`~a2g_jax.io.reading.reading`, or else the first tier of words: one with a name such as ``words`` or
+            ``speaker - words``, otherwise the first that holds no phones.
 
     Raises:
         InputError: no such file, not a TextGrid, damaged (with the line), or without that tier.
     """
+    choices = current_reading()
+    words, notes = read_words_with_notes(path, choices.tier if tier is None else tier)
+    # A tier named by the caller may hold anything; phones have no words.
+    for note in notes if tier is None else ():
+        choices.note(path, note)
+    return words
+
+
+def read_words_with_notes(path: str | os.PathLike[str], tier: str | None = None) -> tuple[tuple[Word, ...], list[Note]]:
+    """The words of :func:`read_words`, and remarks on tiers and times."""
     path = check_readable(path, "a TextGrid file")
     tiers = _Parser(path, _text(path)).tiers()
     if not tiers:
         raise InputError(f"{path}: has no interval tier; expected one called 'words'.")
-    if tier is None:
-        chosen = next((entry for entry in tiers if entry[0].strip().lower().endswith(("words", "word"))), tiers[0])
-        return chosen[1]
-    for name, words in tiers:
-        if name == tier:
-            return words
-    names = ", ".join(repr(name) for name, _ in tiers)
-    raise InputError(f"{path}: has no interval tier {tier!r}; its tiers are {names}.")
+    chosen, notes = choose_tier(path, tiers, tier)
+    if is_other_tier(chosen):
+        words = tuple(label for label in chosen.labels if label.text.lower() not in _SILENCES)
+    else:
+        words = tuple(label for label in chosen.labels if is_word(label.text))
+    return words, notes + word_notes(words, f"in tier {chosen.name!r}")
 
 
 def write_words(
@@ -159,7 +171,7 @@ class _Parser:
             self.fail(f"expected {what}; got {_shown(value)}.")
         return int(value)
 
-    def tiers(self) -> list[tuple[str, tuple[Word, ...]]]:
+    def tiers(self) -> list[Tier]:
         """The interval tiers; point tiers are skipped."""
         kind = next(self.tokens, None)
         if kind not in ('"ooTextFile', '"ooTextFile short') or next(self.tokens, None) != '"TextGrid':
@@ -178,21 +190,21 @@ class _Parser:
             self.number(f"the end time of tier {name!r}")
             count = self.count(f"the number of intervals of tier {name!r}")
             if kind == "IntervalTier":
-                result.append((name, tuple(self.words(name, count))))
+                result.append(Tier(name, tuple(self.labels(name, count))))
             else:
                 for _ in range(count):
                     self.number(f"a time in tier {name!r}")
                     self.string(f"a mark in tier {name!r}")
         return result
 
-    def words(self, name: str, count: int) -> Iterator[Word]:
+    def labels(self, name: str, count: int) -> Iterator[Word]:
         last = -math.inf
         for _ in range(count):
             start, end = self.number(f"a start time in tier {name!r}"), self.number(f"an end time in tier {name!r}")
             if not start < end or start < last - 1e-6:
                 self.fail(f"expected rising times in tier {name!r}; got {start} to {end}.")
             text = " ".join(self.string(f"a text in tier {name!r}").split())
-            if text.lower() not in _SILENCES:
+            if text:
                 yield Word(text, start, end)
             last = end
 

@@ -12,8 +12,10 @@ from jaxtyping import Int
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable, read_json
-from a2g_jax.io.textgrid import read_words
-from a2g_jax.io.words import Word
+from a2g_jax.io.reading import Note, current_reading
+from a2g_jax.io.textgrid import read_words_with_notes
+from a2g_jax.io.word_tiers import word_notes
+from a2g_jax.io.words import Word, is_word
 
 #: Largest time in a transcript, in seconds: a larger number is an error in units.
 _LONGEST = 1e6
@@ -24,7 +26,7 @@ _LARGEST_FILE = 2**26
 FRAME_SLACK = 1e-6
 
 
-def read_transcript(path: str | os.PathLike[str]) -> tuple[Word, ...]:
+def read_transcript(path: str | os.PathLike[str], tier: str | None = None) -> tuple[Word, ...]:
     """Read the words of a transcript in the order in which they start.
 
     ==========================  ===========================================================================
@@ -36,16 +38,34 @@ def read_transcript(path: str | os.PathLike[str]) -> tuple[Word, ...]:
     ==========================  ===========================================================================
 
     The suffix determines the form, or else the content. Recognisers round times, so a word may have no duration, or
-    start before the previous one ends.
+    start before the previous one ends. Marks of silence, noise and unknown words are left out
+    (:func:`~a2g_jax.io.words.is_word`); remarks go to the enclosing :func:`~a2g_jax.io.reading.reading`.
+
+    Args:
+        tier: of a TextGrid, as for :func:`~a2g_jax.io.textgrid.read_words`.
 
     Raises:
         InputError: no such file, another form, damaged (with the line or the place), or invalid times.
     """
+    choices = current_reading()
+    words, notes = transcript_notes(path, tier)
+    for note in notes:
+        choices.note(path, note)
+    return words
+
+
+def transcript_notes(path: str | os.PathLike[str], tier: str | None = None) -> tuple[tuple[Word, ...], list[Note]]:
+    """The words of :func:`read_transcript`, and remarks on tiers and times."""
     path = check_readable(path, "a transcript (TextGrid, JSON or TSV)")
     if path.stat().st_size > _LARGEST_FILE:
         raise InputError(f"{path}: is larger than {_LARGEST_FILE} bytes; expected the transcript of one recording.")
-    words = _reader(path)(path)
-    return tuple(sorted(words, key=lambda word: word.start))
+    reader = _reader(path)
+    if reader is read_words_with_notes:
+        words, notes = read_words_with_notes(path, current_reading().tier if tier is None else tier)
+    else:
+        words = tuple(word for word in reader(path) if is_word(word.text))
+        notes = word_notes(words)
+    return tuple(sorted(words, key=lambda word: word.start)), notes
 
 
 def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.ndarray, " frames"]:
@@ -70,14 +90,14 @@ def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.nd
 
 
 def _reader(path: Path) -> Callable[[Path], Any]:
-    by_suffix: dict[str, Callable[[Path], Any]] = {".textgrid": read_words, ".json": _google, ".tsv": _table}
+    by_suffix: dict[str, Callable[[Path], Any]] = {".textgrid": read_words_with_notes, ".json": _google, ".tsv": _table}
     reader = by_suffix.get(path.suffix.lower())
     if reader is not None:
         return reader
     with path.open("rb") as file:
         start = file.read(_PREVIEW)
     if b"ooTextFile" in start.replace(b"\0", b""):
-        return read_words
+        return read_words_with_notes
     start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if start[:1] in (b"[", b"{"):
         return _google

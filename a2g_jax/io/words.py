@@ -1,7 +1,12 @@
 """Spoken words with their times."""
 
+import re
 import zlib
 from dataclasses import dataclass
+
+#: Labels of silence, noise and unknown words that aligners write without brackets.
+_MARKS = frozenset({"sil", "sp", "spn", "nsn", "oov", "unk", "eps"})
+_BRACKETED = re.compile(r"<.*>|\[.*\]|\(.*\)|\{.*\}|\*.*\*", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -11,6 +16,18 @@ class Word:
     text: str
     start: float
     end: float
+
+
+def is_word(text: str) -> bool:
+    """Whether a label of a transcript is a spoken word.
+
+    Empty labels, marks of silence and noise (``sil``, ``sp``, ``spn``), anything in brackets as a whole (``<eps>``,
+    ``<unk>``, ``[laughter]``, ``(noise)``, ``{spn}``) and labels without a letter or digit are no words.
+    """
+    label = text.strip()
+    if label.casefold() in _MARKS or not any(letter.isalnum() for letter in label):
+        return False
+    return _BRACKETED.fullmatch(label) is None
 
 
 def word_id(text: str) -> int:

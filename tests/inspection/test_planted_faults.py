@@ -177,7 +177,9 @@ def test_silence():
 
 def test_offset_of_samples_and_faint_speech():
     audio = clean(2).audio
-    assert codes(check_audio(audio * np.float32(0.5) + np.float32(0.05), RATE)) == {"dc"}
+    (found,) = check_audio(audio * np.float32(0.5) + np.float32(0.05), RATE)
+    assert (found.severity, found.code) == ("info", "dc")
+    assert found.value == pytest.approx(0.05, abs=1e-3)
     assert codes(check_audio(audio * np.float32(0.003), RATE)) == {"faint"}
 
 

@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.audio import SILENCE
+from a2g_jax.features.offset import without_offset
+from a2g_jax.io.audio import FINE_SILENCE, SILENCE, resampled
 
 #: Peak beyond which floating-point samples are in another unit than -1 to 1.
 _LOUDEST = 100.0
@@ -12,7 +13,7 @@ _LOWEST_RATE, _HIGHEST_RATE = 1_000, 1_000_000
 
 
 def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str) -> Float[np.ndarray, " N"]:
-    """Mono float32 samples at ``sample_rate``, under the conditions of :func:`~a2g_jax.io.audio.read_audio`.
+    """Mono float32 samples at ``sample_rate``, around zero, as :func:`~a2g_jax.io.audio.read_audio` gives them.
 
     Args:
         samples: one channel, signed integers of any width (scaled to -1 to 1) or floating-point numbers.
@@ -39,12 +40,8 @@ def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str)
     peak = float(np.max(np.abs(sound)))
     if peak > _LOUDEST:
         raise InputError(f"{place}: has samples as large as {peak:.4g}; scale them to -1 to 1.")
-    if peak < SILENCE:
-        raise InputError(f"{place}: is silent (its peak is below -70 dB of full scale); leave this recording out.")
-    if rate == sample_rate:
-        return sound
-    import soxr  # slow to load, and many data sets do without
-
-    length = max(1, round(len(sound) * sample_rate / rate))
-    result = np.asarray(soxr.resample(sound, rate, sample_rate, quality="HQ"), np.float32)[:length]
-    return np.pad(result, (0, length - len(result)))
+    fine = flat.dtype.kind == "f" or flat.dtype.itemsize > 2
+    limit, decibels = (FINE_SILENCE, -120) if fine else (SILENCE, -70)
+    if peak < limit:
+        raise InputError(f"{place}: is silent (its peak is below {decibels} dB of full scale); leave it out.")
+    return resampled(without_offset(sound, rate), rate, sample_rate)

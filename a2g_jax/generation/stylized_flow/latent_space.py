@@ -217,6 +217,8 @@ class FlowSpace:
         seed: int = 0,
         style: Style | None = None,
         seed_poses: Motion | Fitted | None = None,
+        *,
+        sample_rate: int | None = None,
     ) -> list[Motion]:
         """Motions for speech: those of :meth:`a2g_jax.generation.generator.Generator.generate` without a style and seed
         poses.
@@ -224,16 +226,17 @@ class FlowSpace:
         Sample k depends on the arguments, the run and k alone, not on how many samples are requested.
 
         Args:
-            audio: mono, at the run's sample rate.
+            audio: mono.
             style: its latents are mixed with the drawn ones.
             seed_poses: a motion that the samples continue: the poses before their first frame are its last ones, on
                 any humanoid rig and at any rate (:func:`~a2g_jax.generation.stylized_flow.fit.fit`); the mean pose if
                 None.
+            sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
 
         Raises:
-            InputError: audio shorter than a frame, too few seed poses, or a style of another run.
+            InputError: audio of several channels or below a frame, too few seed poses, or a style of another run.
         """
-        return list(self.stream(audio, samples, seed, style, seed_poses))
+        return list(self.stream(audio, samples, seed, style, seed_poses, sample_rate=sample_rate))
 
     def stream(
         self,
@@ -242,11 +245,13 @@ class FlowSpace:
         seed: int = 0,
         style: Style | None = None,
         seed_poses: Motion | Fitted | None = None,
+        *,
+        sample_rate: int | None = None,
     ) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one after another."""
         clip = fit(seed_poses, self.run, "the seed clip", whole=False) if isinstance(seed_poses, Motion) else seed_poses
         earlier = None if clip is None else clip.rows
-        for rows in self.rows(speech_features(self.run, audio), samples, seed, style, earlier):
+        for rows in self.rows(speech_features(self.run, audio, sample_rate), samples, seed, style, earlier):
             rotations = rotations_from_rows(rows, self.run.config.space.kind)
             if clip is not None:
                 rotations = continued(rotations, clip.motion)
