@@ -24,10 +24,10 @@ from a2g_jax.data.datasets.keypoints import relative_keypoints
 from a2g_jax.data.datasets.layouts import S2G_LAYOUT
 from a2g_jax.data.datasets.lookup import SPLIT_NAMES, files_with
 from a2g_jax.data.datasets.source import DataSet, Take
-from a2g_jax.data.folder import AUDIO_SUFFIXES
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.audio import read_audio
+from a2g_jax.io.sound_file import AUDIO_SUFFIXES
 from a2g_jax.io.hdf5 import read_hdf5
 from a2g_jax.io.untrusted import Limits
 from a2g_jax.recording import PoseRecording
