@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -71,9 +72,7 @@ def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
     return float(10 * np.log10(max(active.mean() if active.size else 0.0, 1e-20)))
 
 
-def log_mel(
-    audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
-) -> Float[np.ndarray, "frames width"]:
+def log_mel(audio: Any, config: MelConfig, fps: float, frames: int) -> Float[np.ndarray, "frames width"]:
     """Log-mel energies in dB, one row for each motion frame (with ``config.stack`` spectra in it).
 
     The window of frame k is centred on time ``k / fps``, rounded to the nearest sample for every frame, so the features
@@ -81,7 +80,7 @@ def log_mel(
     padded with zeros, and a constant offset is removed before (:mod:`a2g_jax.features.offset`).
 
     Args:
-        audio: mono samples at ``config.sample_rate``.
+        audio: (N,), mono samples at ``config.sample_rate``.
         frames: number of rows; motion of the same length has ``round(seconds * fps)``.
 
     Raises:

@@ -2,9 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-
-import numpy as np
-from jaxtyping import Float
+from typing import Any
 
 from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
@@ -23,7 +21,7 @@ _REPORTS = r"(pins|checks|style)\.json"
 def export(
     run: Run,
     sampler: Sampler,
-    audio: Float[np.ndarray, " N"],
+    audio: Any,
     out: str | os.PathLike[str],
     *,
     samples: int,
@@ -44,7 +42,7 @@ def export(
     Args:
         run: the sampler's.
         sampler: a ``Checked`` one is used as it is; with ``strict``, nothing is written before all samples are good.
-        audio: mono.
+        audio: (N,), mono.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
         label: description of the sampler, for the page's subtitle.

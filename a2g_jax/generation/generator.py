@@ -46,11 +46,11 @@ class Generator:
         self.run = run
         self.engine = Engine(run, window)
 
-    def frames(self, audio: Audio, sample_rate: int | None = None) -> int:
+    def frames(self, audio: Any, sample_rate: int | None = None) -> int:
         """Length of the motion for an audio: its seconds times fps, rounded."""
         return audio_frames(self.run, audio, sample_rate)
 
-    def check(self, audio: Audio) -> None:
+    def check(self, audio: Any) -> None:
         """Refuse sampling settings that do not fit an audio, before any work.
 
         Raises:
@@ -62,7 +62,7 @@ class Generator:
 
     def generate(
         self,
-        audio: Audio,
+        audio: Any,
         samples: int,
         seed: int = 0,
         report: Callable[[int], None] = lambda done: None,
@@ -75,7 +75,7 @@ class Generator:
         Sample k depends on the audio, the run, the seed and k alone, not on how many samples are requested.
 
         Args:
-            audio: mono: floating-point numbers in -1 to 1, or integers of full scale.
+            audio: (N,), mono: floating-point numbers in -1 to 1, or integers of full scale.
             samples: how many.
             seed: of everything random.
             report: called with the number of samples done.
@@ -94,7 +94,7 @@ class Generator:
         return motions
 
     def stream(
-        self, audio: Audio, samples: int, seed: int = 0, *, sample_rate: int | None = None, **given: Any
+        self, audio: Any, samples: int, seed: int = 0, *, sample_rate: int | None = None, **given: Any
     ) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one at a time."""
         audio = speech_at_rate(self.run, audio, sample_rate)
@@ -143,7 +143,7 @@ def speech_at_rate(run: Run, audio: Any, sample_rate: int | None) -> Audio:
     return resampled(without_offset(samples, int(sample_rate)), int(sample_rate), run.config.mel.sample_rate)
 
 
-def audio_frames(run: Run, audio: Audio, sample_rate: int | None = None) -> int:
+def audio_frames(run: Run, audio: Any, sample_rate: int | None = None) -> int:
     """Length of a run's motion for an audio: its seconds times fps, rounded.
 
     Raises:
@@ -155,7 +155,7 @@ def audio_frames(run: Run, audio: Audio, sample_rate: int | None = None) -> int:
     return round(len(samples) / run.config.mel.sample_rate * run.config.fps)
 
 
-def speech_features(run: Run, audio: Audio, sample_rate: int | None = None) -> Float[np.ndarray, "T bands"]:
+def speech_features(run: Run, audio: Any, sample_rate: int | None = None) -> Float[np.ndarray, "T bands"]:
     """Log-mel features of speech at a run's frames, not normalised.
 
     Args:

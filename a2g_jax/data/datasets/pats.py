@@ -27,8 +27,8 @@ from a2g_jax.data.datasets.source import DataSet, Take
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_track import PoseTrack
 from a2g_jax.io.audio import read_audio
-from a2g_jax.io.sound_file import AUDIO_SUFFIXES
 from a2g_jax.io.hdf5 import read_hdf5
+from a2g_jax.io.sound_file import AUDIO_SUFFIXES
 from a2g_jax.io.untrusted import Limits
 from a2g_jax.recording import PoseRecording
 

@@ -88,13 +88,14 @@ class LatentSpace:
         self._write = space.from_rotations
         self._decode = jax.jit(lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None])[0]))
 
-    def from_audio(self, audio: Float[np.ndarray, " N"], seed: int = 0, sample: int = 0) -> Codes:
+    def from_audio(self, audio: Any, seed: int = 0, sample: int = 0, *, sample_rate: int | None = None) -> Codes:
         """S_A of speech and a drawn I_R: those of ``a2g generate --seed`` for this sample number.
 
         Args:
-            audio: mono, at the run's sample rate.
+            audio: (N,), mono.
+            sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
         """
-        config, features = self._run.config, speech_features(self._run, audio)
+        config, features = self._run.config, speech_features(self._run, audio, sample_rate)
         frames = len(features)
         padded = np.pad(features, ((self._context, self._after(frames)), (0, 0)), constant_values=features.min())
         normalised = np.asarray(config.statistics["audio"].normalise(padded), np.float32)

@@ -212,7 +212,7 @@ class FlowSpace:
 
     def generate(
         self,
-        audio: Float[np.ndarray, " N"],
+        audio: Any,
         samples: int,
         seed: int = 0,
         style: Style | None = None,
@@ -226,7 +226,7 @@ class FlowSpace:
         Sample k depends on the arguments, the run and k alone, not on how many samples are requested.
 
         Args:
-            audio: mono.
+            audio: (N,), mono.
             style: its latents are mixed with the drawn ones.
             seed_poses: a motion that the samples continue: the poses before their first frame are its last ones, on
                 any humanoid rig and at any rate (:func:`~a2g_jax.generation.stylized_flow.fit.fit`); the mean pose if
@@ -240,7 +240,7 @@ class FlowSpace:
 
     def stream(
         self,
-        audio: Float[np.ndarray, " N"],
+        audio: Any,
         samples: int,
         seed: int = 0,
         style: Style | None = None,
