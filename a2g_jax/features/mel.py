@@ -86,14 +86,15 @@ def log_mel(audio: Any, config: MelConfig, fps: float, frames: int) -> Float[np.
     Raises:
         InputError: several channels, or NaN.
     """
-    rows = _log_mel_rows(audio, config, fps * config.stack, frames * config.stack)
+    samples = mono_samples(audio)
+    rows = _log_mel_rows(samples, config, fps * config.stack, frames * config.stack)
     return rows.reshape(frames, config.width)
 
 
 def _log_mel_rows(
     audio: Float[np.ndarray, " N"], config: MelConfig, fps: float, frames: int
 ) -> Float[np.ndarray, "frames bands"]:
-    audio = without_offset(mono_samples(audio), config.sample_rate)
+    audio = without_offset(audio, config.sample_rate)
     if config.level_db is not None:
         gain = 10 ** ((config.level_db - active_level_db(audio, config.sample_rate)) / 20)
         audio = audio * np.float32(gain)

@@ -21,7 +21,55 @@ _NO_WORDS = frozenset(
 _LONGEST = 5.0
 #: Median length from which times are in another unit, seconds; milliseconds of a word as seconds.
 _OTHER_UNIT, _MILLISECONDS = 20.0, (20.0, 5000.0)
-#: Phones: labels up to this long, in seconds up to this long, at least so many.
+#: Phones of English by the Montreal Forced Aligner's older models, and the share of labels that shows them.
+_ARPABET = frozenset(
+    [
+        "AA",
+        "AE",
+        "AH",
+        "AO",
+        "AW",
+        "AY",
+        "B",
+        "CH",
+        "D",
+        "DH",
+        "EH",
+        "ER",
+        "EY",
+        "F",
+        "G",
+        "HH",
+        "IH",
+        "IY",
+        "JH",
+        "K",
+        "L",
+        "M",
+        "N",
+        "NG",
+        "OW",
+        "OY",
+        "P",
+        "R",
+        "S",
+        "SH",
+        "T",
+        "TH",
+        "UH",
+        "UW",
+        "V",
+        "W",
+        "Y",
+        "Z",
+        "ZH",
+        "sp",
+        "sil",
+        "spn",
+    ]
+)
+_MOSTLY = 0.9
+#: Phones in other alphabets: labels up to this long, in seconds up to this long, at least so many.
 _PHONE_LETTERS, _PHONE_SECONDS, _PHONES = 2, 0.2, 20
 
 
@@ -46,6 +94,8 @@ def is_other_tier(tier: Tier) -> bool:
     labels = [label for label in tier.labels if label.text.isascii() or label.text.islower()]
     if len(labels) < _PHONES or len(labels) < len(tier.labels):
         return False
+    if np.mean([label.text.rstrip("012") in _ARPABET for label in labels]) > _MOSTLY:
+        return True
     letters = float(np.median([len(label.text) for label in labels]))
     return letters <= _PHONE_LETTERS and float(np.median([one.end - one.start for one in labels])) < _PHONE_SECONDS
 

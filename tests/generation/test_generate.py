@@ -6,12 +6,14 @@ import pytest
 
 from a2g_jax.cli import main
 from a2g_jax.errors import InputError
+from a2g_jax.generation.export import export
 from a2g_jax.generation.formats import chosen_formats
 from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.euler import euler_matrices
 from a2g_jax.geometry.ground import plant_feet
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.io.audio import write_audio
+from a2g_jax.geometry.retarget.poses import rotation_angle
+from a2g_jax.io.audio import resampled, write_audio
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.training.run import Run
@@ -131,3 +133,67 @@ def test_edits_of_bands_from_the_command_line(tmp_path, capsys):
         assert main([*command, "--out", str(tmp_path / "none"), *flags]) == 2
         assert message in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+def angles(first, second):
+    """Largest angle between the joints of two motions, degrees."""
+    return float(rotation_angle(np.asarray(first.rotations), np.asarray(second.rotations)).max())
+
+
+def test_audio_of_another_rate_is_resampled(generator):
+    high = resampled(_SPEECH, 16000, 48000)
+    expected = generator.generate(resampled(high, 48000, 16000), 1, seed=3)[0]
+    motion = generator.generate(high, 1, seed=3, sample_rate=48000)[0]
+    assert motion.frames == generator.frames(high, 48000) == 180
+    np.testing.assert_array_equal(motion.rotations, expected.rotations)
+    assert angles(motion, generator.generate(_SPEECH, 1, seed=3)[0]) < 5.0
+    for rate in (0, -16000, 10):
+        with pytest.raises(InputError, match="expected 1000 to 1000000 Hz"):
+            generator.generate(high, 1, sample_rate=rate)
+
+
+def test_integers_are_scaled(generator):
+    whole = np.rint(32767 * _SPEECH).astype(np.int16)
+    assert angles(generator.generate(whole, 1)[0], generator.generate(_SPEECH, 1)[0]) < 0.1
+
+
+@pytest.mark.parametrize("shape", [(96000, 2), (2, 96000)])
+def test_several_channels_are_one_clear_error(generator, shape, tmp_path):
+    both = np.resize(_SPEECH, 192000).reshape(shape)
+    for call in (
+        lambda: generator.generate(both, 1),
+        lambda: generator.generate(both, 1, sample_rate=48000),
+        lambda: next(generator.stream(both, 1)),
+        lambda: generator.frames(both),
+        lambda: export(generator.run, generator, both, tmp_path, samples=1, seed=0, formats=("bvh",), title="a"),
+    ):
+        with pytest.raises(InputError, match="2 channels, and one is expected; average them"):
+            call()
+
+
+@pytest.mark.parametrize("offset", [0.02, -0.2])
+def test_an_offset_and_the_level_change_nothing(generator, offset):
+    plain = generator.generate(_SPEECH, 1, seed=3)[0]
+    for gain in (1.0, 0.001):
+        moved = (gain * (_SPEECH + offset)).astype(np.float32)
+        assert angles(generator.generate(moved, 1, seed=3)[0], plain) < 0.2
+
+
+def test_the_commands_warn_before_they_generate(tmp_path, capsys):
+    """Of noise, and of two channels, one of which can be chosen; the motion is written nevertheless."""
+    import soundfile
+
+    noise = 0.1 * np.random.default_rng(0).normal(size=3 * 16000)
+    soundfile.write(tmp_path / "noise.wav", noise, 16000)
+    flags = ["--samples", "1", "--formats", "bvh", "--out", str(tmp_path / "out")]
+    assert main(["generate", "demo", "--audio", str(tmp_path / "noise.wav"), *flags]) == 0
+    assert "warning:" in (said := capsys.readouterr().err)
+    assert "no speech is found" in said
+    both = np.stack([_SPEECH, talk(6.0, 22, speaker="bruno").audio], axis=1)
+    soundfile.write(tmp_path / "both.wav", both, 16000, subtype="FLOAT")
+    for channel, warned in ((None, True), ("right", False)):
+        given = [] if channel is None else ["--channel", channel]
+        assert main(["generate", "demo", "--audio", str(tmp_path / "both.wav"), *given, *flags]) == 0
+        assert ("left and right differ" in capsys.readouterr().err) == warned
+    assert main(["generate", "demo", "--audio", str(tmp_path / "both.wav"), "--channel", "3", *flags]) == 2
+    assert "channel 3 was chosen" in capsys.readouterr().err
