@@ -151,8 +151,8 @@ def load_audio(path: str | os.PathLike[str], *, channel: int | None = None, max_
         if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
             raise InputError(f"{path}: has a sample rate of {rate} Hz; expected {_LOWEST_RATE} to {_HIGHEST_RATE}.")
         if channel is not None and channel > channels:
-            count = "1 channel" if channels == 1 else f"{channels} channels"
-            raise InputError(f"{path}: has {count}, and channel {channel} was chosen; choose another (--channel).")
+            number = "1 channel" if channels == 1 else f"{channels} channels"
+            raise InputError(f"{path}: has {number}, and channel {channel} was chosen; choose another (--channel).")
         longest = int(max_seconds * rate)
         if longest < claimed != _UNKNOWN_LENGTH:
             _refuse_length(path, claimed / rate, max_seconds)
@@ -177,10 +177,10 @@ def load_audio(path: str | os.PathLike[str], *, channel: int | None = None, max_
             count += len(block)
             if count > longest:
                 _refuse_length(path, count / rate, max_seconds)
-            peak = max(peak, float(np.max(np.abs(block))))
-            mixed = block[:, 0] if block.shape[1] == 1 else block.mean(axis=1, dtype=np.float64).astype(np.float32)
+            highest = float(max(block.max(), -block.min()))
+            peak, mixed = max(peak, highest), _mixed(block)
             if meter is not None:
-                meter.add(block, mixed)
+                meter.add(block, mixed, highest)
             blocks.append(mixed)
         info = AudioInfo(rate, channels, count, format, sound.subtype)
         header = header or getattr(sound, "remark", "")
@@ -196,6 +196,14 @@ def load_audio(path: str | os.PathLike[str], *, channel: int | None = None, max_
     found = Sound(path, np.concatenate(blocks), info, peak, None if meter is None else meter.channels(), header)
     _check_level(found)
     return found
+
+
+def _mixed(block: Float[np.ndarray, "n C"]) -> Float[np.ndarray, " n"]:
+    if block.shape[1] == 1:
+        return np.ascontiguousarray(block[:, 0])
+    if block.shape[1] == 2:  # half the sum in single precision is the rounded mean, and five times as fast
+        return (block[:, 0] + block[:, 1]) * np.float32(0.5)
+    return block.mean(axis=1, dtype=np.float64).astype(np.float32)
 
 
 def _refuse_length(path: Path, seconds: float, max_seconds: float) -> None:

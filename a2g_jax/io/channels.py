@@ -37,38 +37,44 @@ class Channels:
 
 
 class Meter:
-    """Collects :class:`Channels` from consecutive blocks of samples."""
+    """Collects :class:`Channels` from consecutive blocks of samples.
+
+    Power is that of every few samples, 8000 a second: it is the same, since what is above folds down.
+    """
 
     def __init__(self, channels: int, sample_rate: int) -> None:
-        self._size = max(1, int(BLOCK * sample_rate))
-        self._rest = np.zeros((0, channels), np.float32)
+        self._step = max(1, sample_rate // 8000)
+        self._size = max(1, int(BLOCK * sample_rate / self._step))
+        self._rest = np.zeros((0, channels + 1), np.float32)
         self._power: list[np.ndarray] = []
-        self._mixed: list[np.ndarray] = []
         self._clipped = np.zeros(channels)
         self._count = 0
 
-    def add(self, block: Float[np.ndarray, "n C"], mixed: Float[np.ndarray, " n"]) -> None:
-        """Measure further samples, and their mean."""
-        self._count += len(block)
-        if float(np.abs(block).max(initial=0.0)) >= _FULL:
+    def add(self, block: Float[np.ndarray, "n C"], mixed: Float[np.ndarray, " n"], peak: float) -> None:
+        """Measure further samples.
+
+        Args:
+            mixed: their mean.
+            peak: the largest of them.
+        """
+        if peak >= _FULL:
             full = np.abs(block) >= _FULL
             self._clipped += (full[2:] & full[1:-1] & full[:-2]).sum(axis=0)
-        joined = np.concatenate([block, mixed[:, None]], axis=1)
-        if len(self._rest):
-            joined = np.concatenate([self._rest, joined])
-        elif self._rest.shape[1] != joined.shape[1]:
-            self._rest = np.zeros((0, joined.shape[1]), np.float32)
+        first = -self._count % self._step
+        self._count += len(block)
+        some = np.concatenate([block[first :: self._step], mixed[first :: self._step, None]], axis=1)
+        joined = np.concatenate([self._rest, some])
         count = len(joined) // self._size
         blocks = joined[: count * self._size].reshape(count, self._size, -1)
-        variance = np.maximum(np.einsum("ksc,ksc->kc", blocks, blocks) / self._size - blocks.mean(axis=1) ** 2, 0)
-        self._power.append(variance[:, :-1])
-        self._mixed.append(variance[:, -1])
+        squares = np.einsum("ksc,ksc->kc", blocks, blocks) / self._size
+        self._power.append(np.maximum(squares - np.einsum("ksc->kc", blocks) ** 2 / self._size**2, 0))
         self._rest = joined[count * self._size :].copy()
 
     def channels(self) -> Channels:
         """The measurement so far."""
         share = tuple(float(value) for value in self._clipped / max(self._count, 1))
-        return Channels(np.concatenate(self._power), np.concatenate(self._mixed), share)
+        power = np.concatenate(self._power)
+        return Channels(power[:, :-1], power[:, -1], share)
 
 
 #: Samples from here on are at full scale.

@@ -36,7 +36,7 @@ def open_sound(path: Path, max_seconds: float) -> Iterator[tuple[Any, str]]:
         with _soundfile(path, head) as sound:
             yield sound, ""
         return
-    with rebuilt(path, layout) as file, _soundfile(path, head, file) as sound:
+    with rebuilt(path, layout) as whole, _soundfile(path, head, whole) as sound:
         yield sound, layout.note
 
 

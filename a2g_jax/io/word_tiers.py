@@ -23,51 +23,10 @@ _LONGEST = 5.0
 _OTHER_UNIT, _MILLISECONDS = 20.0, (20.0, 5000.0)
 #: Phones of English by the Montreal Forced Aligner's older models, and the share of labels that shows them.
 _ARPABET = frozenset(
-    [
-        "AA",
-        "AE",
-        "AH",
-        "AO",
-        "AW",
-        "AY",
-        "B",
-        "CH",
-        "D",
-        "DH",
-        "EH",
-        "ER",
-        "EY",
-        "F",
-        "G",
-        "HH",
-        "IH",
-        "IY",
-        "JH",
-        "K",
-        "L",
-        "M",
-        "N",
-        "NG",
-        "OW",
-        "OY",
-        "P",
-        "R",
-        "S",
-        "SH",
-        "T",
-        "TH",
-        "UH",
-        "UW",
-        "V",
-        "W",
-        "Y",
-        "Z",
-        "ZH",
-        "sp",
-        "sil",
-        "spn",
-    ]
-)
+    {"AA", "AE", "AH", "AO", "AW", "AY", "B", "CH", "D", "DH", "EH", "ER", "EY", "F", "G", "HH", "IH", "IY", "JH", "K",
+     "L", "M", "N", "NG", "OW", "OY", "P", "R", "S", "SH", "T", "TH", "UH", "UW", "V", "W", "Y", "Z", "ZH", "sp", "sil",
+     "spn"}
+)  # fmt: skip
 _MOSTLY = 0.9
 #: Phones in other alphabets: labels up to this long, in seconds up to this long, at least so many.
 _PHONE_LETTERS, _PHONE_SECONDS, _PHONES = 2, 0.2, 20

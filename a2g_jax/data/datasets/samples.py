@@ -4,7 +4,6 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.features.offset import without_offset
 from a2g_jax.io.audio import FINE_SILENCE, SILENCE, resampled
 
 #: Peak beyond which floating-point samples are in another unit than -1 to 1.
@@ -13,7 +12,7 @@ _LOWEST_RATE, _HIGHEST_RATE = 1_000, 1_000_000
 
 
 def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str) -> Float[np.ndarray, " N"]:
-    """Mono float32 samples at ``sample_rate``, around zero, as :func:`~a2g_jax.io.audio.read_audio` gives them.
+    """Mono float32 samples at ``sample_rate``, as :func:`~a2g_jax.io.audio.read_audio` gives them.
 
     Args:
         samples: one channel, signed integers of any width (scaled to -1 to 1) or floating-point numbers.
@@ -44,4 +43,4 @@ def speech_samples(samples: np.ndarray, rate: int, sample_rate: int, place: str)
     limit, decibels = (FINE_SILENCE, -120) if fine else (SILENCE, -70)
     if peak < limit:
         raise InputError(f"{place}: is silent (its peak is below {decibels} dB of full scale); leave it out.")
-    return resampled(without_offset(sound, rate), rate, sample_rate)
+    return resampled(sound, rate, sample_rate)
