@@ -7,7 +7,7 @@ from a2g_jax.io.textgrid import read_words
 from experiments.cases.runner import Case, Outcome, finds, refuses, reported
 
 
-def _words(*expected: str):  # noqa: ANN202
+def _words(*expected: str):
     def check(path: Path) -> Outcome:
         report, words = inspect(path), [word.text for word in read_words(path)]
         return words == list(expected) and report.warnings == 0, f"{len(words)} words {words}; {reported(report)}"
