@@ -2,13 +2,15 @@
 
 Recognises the names of BEAT, ZeroEGGS, Trinity and Mixamo (``LeftForeArm``), Talking With Hands (``b_l_forearm``), SMPL
 and SMPL-X (``L_Elbow``, ``left_elbow``), Unreal (``lowerarm_l``), 3ds Max Biped (``Bip01 L Forearm``), Blender
-(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``) and similar ones, with any
-prefix, case or separator.
+(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``), MikuMikuDance (``左ひじ``) and
+similar ones, with any prefix, case or separator.
 """
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+from a2g_jax.geometry.joint_words import in_english
 
 FINGERS = ("Index", "Middle", "Pinky", "Ring", "Thumb")
 """The five fingers in SMPL-X order."""
@@ -96,7 +98,7 @@ class JointName:
 
 def parse_name(name: str) -> JointName:
     """Split one joint name."""
-    words = [word.lower() for word in _WORD.findall(re.split("[:|]", name)[-1])]
+    words = [word.lower() for word in _WORD.findall(re.split("[:|]", in_english(name))[-1])]
     while len(words) > 1 and words[0] in _CASING:
         words = words[1:]
         # With "Bip01" its number.

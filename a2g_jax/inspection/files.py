@@ -12,7 +12,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.audio_checks import check_audio
-from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_first_frames, scan_bvh
+from a2g_jax.inspection.bvh_file import check_layout, check_wraps, scan_bvh
 from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
 from a2g_jax.inspection.finding import Finding, Place, located
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
@@ -27,6 +27,7 @@ from a2g_jax.inspection.sync import (
 )
 from a2g_jax.inspection.tree import skeleton_facts
 from a2g_jax.io.audio import audio_info, read_audio
+from a2g_jax.io.bvh_reader import build
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.io.transcripts import read_transcript
 from a2g_jax.io.untrusted import read_npz
@@ -76,22 +77,21 @@ def inspect_file(path: Path) -> Inspected:
 def inspect_bvh(path: Path) -> Inspected:
     """Inspect a BVH file; faults of the header become warnings, and the readable frames are inspected."""
     file = scan_bvh(path)
-    findings = check_frame_count(file)
-    faults, values = check_rows(file)
-    findings += faults
-    motion = read_first_frames(path, file, len(values))
+    findings = list(file.findings)
     facts: dict[str, Any] = {
         "file": {
-            "frames by the header": file.claimed,
-            "frame time (s)": file.frame_time,
+            "frames by the header": file.parsed.frames,
+            "frame time (s)": file.parsed.frame_time,
             "channels": len(file.channels),
             "root channels": " ".join(file.root_order),
             "rotation orders": list(file.orders),
         }
     }
-    if motion is None:
+    if len(file.values) == 0:
         return Inspected(str(path), "bvh", facts, located(findings, path=str(path)))
-    findings += check_wraps(file, values, motion)
+    motion, layout = build(file.parsed, file.values)
+    facts["file"]["unit"] = str(layout.unit)
+    findings += check_layout(layout) + check_wraps(file, file.values, motion)
     inspected = _with_motion(path, "bvh", motion, facts)
     inspected.findings = located(findings, path=str(path)) + inspected.findings
     return inspected
