@@ -1,6 +1,7 @@
 """Preparation of a whole corpus with a progress bar: generated, or from the recordings of a data set."""
 
 import os
+import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -19,7 +20,7 @@ from a2g_jax.data.generated import TalkerOptions, generate_rows
 from a2g_jax.data.on_demand import OnDemand, split_roles
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, InputWarning
 from a2g_jax.geometry.pose_space import interchangeable
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
@@ -88,6 +89,7 @@ def prepare_data_set(
     labelled: bool = False,
     workers: int | None = None,
     skeleton: Skeleton | None = None,
+    smooth: float | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
@@ -104,6 +106,7 @@ def prepare_data_set(
         labelled: leave out recordings without an emotion, and note them in the manifest.
         workers: number of processes; one for every core if None.
         skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
+        smooth: frequency in Hz above which motions are filtered (:func:`~a2g_jax.geometry.smooth.smooth`); None: not.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
@@ -124,8 +127,16 @@ def prepare_data_set(
         recipe["labelled"] = True
     if skeleton is not None:
         recipe["body"] = skeleton_to_json(skeleton)
+    if smooth is not None:
+        recipe["smooth"] = smooth
     read = partial(
-        _read_rows, name=name, features=features, skip_broken=skip_broken, labelled=labelled, skeleton=skeleton
+        _read_rows,
+        name=name,
+        features=features,
+        skip_broken=skip_broken,
+        labelled=labelled,
+        skeleton=skeleton,
+        smooth=smooth,
     )
     items = [Item(take.name, take.sources) for take in takes]
     groups = {take.name: take.group for take in takes if take.group}
@@ -191,6 +202,8 @@ def make_rows(
             )
             rows = in_order(pool, work, rest, 2 * count + 2)
         for prepared in rows:
+            for note in getattr(prepared, "notes", ()):
+                say(note)
             yield prepared
             bar.update()
 
@@ -210,14 +223,25 @@ def read_take(take: Take, name: str, sample_rate: int) -> Recording | PoseRecord
 
 
 def _read_rows(
-    take: Take, name: str, features: Features, skip_broken: bool, labelled: bool, skeleton: Skeleton | None
+    take: Take,
+    name: str,
+    features: Features,
+    skip_broken: bool,
+    labelled: bool,
+    skeleton: Skeleton | None,
+    smooth: float | None,
 ) -> Prepared | Skipped:
     try:
-        recording = read_take(take, name, features.mel.sample_rate)
+        # Doubts about a file are shown by the process that has the progress bar.
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", InputWarning)
+            recording = read_take(take, name, features.mel.sample_rate)
         if labelled and not recording.emotion:
             return Skipped(take.name, take.sources, f"{take.sources[0]}: has no emotion label.")
-        return prepare_recording(recording, features, take.split, skeleton)
+        prepared = prepare_recording(recording, features, take.split, skeleton, smooth)
     except InputError as error:
         if not skip_broken:
             raise
         return Skipped(take.name, take.sources, str(error))
+    doubts = tuple(str(one.message) for one in found if issubclass(one.category, InputWarning))
+    return replace(prepared, notes=doubts + prepared.notes)

@@ -122,7 +122,7 @@ def check_layout(layout: Layout) -> list[Finding]:
         findings.append(Finding(severity, "unit", f"{unit}.", fix, value=unit.metres))
     if layout.carrier:
         name = layout.joints[layout.carrier].name
-        message = f"the path of the body is in the position channels of {name}, below the root; it is read as the root's."
+        message = f"the path of the body is in the position channels of {name}; it is read as that of the root above."
         findings.append(Finding("info", "path", message, place=Place(joint=name)))
     if layout.stretch is not None and layout.stretch.metres > STRETCH:
         place = Place(joint=layout.stretch.joint, frame=layout.stretch.frame)

@@ -23,13 +23,26 @@ def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
     try:
         return find_rig(motion, name=path), []
     except InputError as error:
-        message = f"no body is found in the skeleton ({error})"
+        message = f"no human body is found in the skeleton ({error})"
         fix = "Facts that need a body (speeds of the hands, the offset) are left out; retargeting is not possible."
         return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
 
 
-def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
-    """Length, frame rate, rotation ranges of joints, speed and reach of hands and head."""
+def body_places(motion: Motion, rig: Rig) -> Float[np.ndarray, "T J 3"]:
+    """Positions of the joints in metres: left, up, forward of the rig's world."""
+    world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
+    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
+    return (positions + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+
+
+def motion_facts(
+    motion: Motion, rig: Rig | None, positions: Float[np.ndarray, "T J 3"] | None = None
+) -> dict[str, Any]:
+    """Length, frame rate, rotation ranges of joints, speed and reach of hands and head.
+
+    Args:
+        positions: of the joints (:func:`body_places`), if computed before.
+    """
     facts: dict[str, Any] = {
         "frames": motion.frames,
         "fps": round(motion.fps, 6),
@@ -47,9 +60,7 @@ def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
         }
     if rig is None or motion.frames < 2:
         return facts
-    world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
-    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
-    positions = (positions + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+    positions = body_places(motion, rig) if positions is None else positions
     chest = positions[:, rig.roles["Chest"]]
     for part in _TRACKED:
         if part in rig.roles:

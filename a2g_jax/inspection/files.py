@@ -13,9 +13,10 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.audio_checks import check_audio
 from a2g_jax.inspection.bvh_file import check_layout, check_wraps, scan_bvh
-from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
-from a2g_jax.inspection.finding import Finding, Place, located
-from a2g_jax.inspection.motion_checks import check_finite, check_motion
+from a2g_jax.inspection.describe import audio_facts, body_places, motion_facts, try_rig, word_facts
+from a2g_jax.inspection.finding import Finding, Place, later, located
+from a2g_jax.inspection.motion_checks import check_calibration, check_finite, check_motion
+from a2g_jax.inspection.shaking import check_shaking
 from a2g_jax.inspection.sync import (
     Offset,
     at_rate,
@@ -99,8 +100,16 @@ def inspect_bvh(path: Path) -> Inspected:
 
 def _with_motion(path: Path, kind: str, motion: Motion, facts: dict[str, Any]) -> Inspected:
     rig, findings = try_rig(motion, str(path))
-    findings += check_motion(motion, rig)
-    facts |= {"motion": motion_facts(motion, rig), "skeleton": skeleton_facts(motion.skeleton, rig)}
+    calibration, start = check_calibration(motion)
+    places = None if rig is None else body_places(motion, rig)
+    findings += calibration
+    # What is not part of the take has faults of its own.
+    taken = motion.clip(start, motion.frames) if start else motion
+    faults = check_motion(taken, rig)
+    if not any(finding.code == "nan" for finding in faults):
+        faults += check_shaking(taken, rig, None if places is None else places[start:])
+    findings += later(faults, start, motion.fps)
+    facts |= {"motion": motion_facts(motion, rig, places), "skeleton": skeleton_facts(motion.skeleton, rig)}
     return Inspected(str(path), kind, facts, located(findings, path=str(path)), motion, rig)
 
 

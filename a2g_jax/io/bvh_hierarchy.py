@@ -47,8 +47,10 @@ class Stretch:
 
     def __str__(self) -> str:
         """The warning."""
-        what = "the position channels of one joint move" if self.moving == 1 else (
-            f"the position channels of {self.moving} joints move"
+        what = (
+            "the position channels of one joint move"
+            if self.moving == 1
+            else (f"the position channels of {self.moving} joints move")
         )
         return (
             f"{what} against the joint above; bones have a fixed length here, so joints are up to "
@@ -97,7 +99,7 @@ def comma_hint(token: str) -> str:
     if "," not in token:
         return ""
     if _DECIMAL_COMMA.fullmatch(token):
-        return " (a decimal comma: write a point in all numbers of the file, or export it with an English number format)"
+        return " (a decimal comma: write a point in all numbers, or export the file with an English number format)"
     return " (commas separate the values: write spaces instead)"
 
 
@@ -234,9 +236,7 @@ class _Parser:
             token = self.next()
             value = parse_number(token)
             if value is None:
-                self.fail(
-                    f"expected three numbers as the OFFSET of {owner}; got {shown(token)}{comma_hint(token)}."
-                )
+                self.fail(f"expected three numbers as the OFFSET of {owner}; got {shown(token)}{comma_hint(token)}.")
             if abs(value) > MAX_VALUE:
                 self.fail(f"the OFFSET of {owner} is out of range; got {shown(token)}.")
             values.append(value)

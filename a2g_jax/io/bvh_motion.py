@@ -118,7 +118,7 @@ def values_of(parsed: Parsed) -> Float[np.ndarray, "T C"]:
     lines, channels = parsed.lines, parsed.channels
     if not any(line.strip() for line in lines):
         message = f"expected {parsed.frames} frames after the frame time; got the end of the file."
-        fail(parsed.path, parsed.first, message)
+        fail(parsed.path, parsed.first + len(lines) - 1, message)
     # The whole block at once; line by line only to locate an error.
     try:
         values = np.loadtxt(lines, dtype=np.float64, comments=None, ndmin=2)

@@ -40,9 +40,9 @@ def poses_of(joints: list[Joint], values: Float[np.ndarray, "T C"]) -> Poses:
     """Bones, rotations and root path of the numbers of a file.
 
     Position channels of the root are its place. Those of other joints that stay the same are bones. Of those that move,
-    one joint's may be the path of the whole body, as the hips' below a root that stays on the floor: the root then takes
-    over the path, and everything below the joint is exactly where it is in the file. Other bones that move have their
-    mean length, and :attr:`Poses.stretch` tells how far that is from the file.
+    one joint's may be the path of the whole body, as the hips' below a root that stays on the floor: the root then
+    takes over the path, and everything below the joint is exactly where it is in the file. Other bones that move have
+    their mean length, and :attr:`Poses.stretch` tells how far that is from the file.
     """
     rest = np.array([joint.offset for joint in joints], np.float64)
     offsets = rest.copy()

@@ -206,7 +206,7 @@ BROKEN = {
     "more frames": (swap("Frames: 2", "Frames: 1"), 20, "says 1 frames and the file has 2; correct the header"),
     "huge claim": (swap("Frames: 2", "Frames: 999999999999"), 20, "the file has 2"),
     "absurd claim": (swap("Frames: 2", "Frames: " + "9" * 5000), 17, "positive number of frames"),
-    "no values": (GOOD[: GOOD.index("10 90")], 18, "the end of the file"),
+    "no values": (GOOD[: GOOD.index("10 90")], 19, "the end of the file"),
     "cut in the last frame": (GOOD[:-10], 20, "expected 9 values"),
 }
 
