@@ -56,6 +56,8 @@ class Unit:
                 f"no usual unit fits a person; lengths are read as {self.name}, which by its limbs makes the body "
                 f"{self.stature:.3g} m tall"
             )
+        if self.plain:
+            return f"lengths are in {self.name}; by its limbs the person is {self.stature:.2f} m tall"
         tall = f"by its limbs the person is then {self.stature:.2f} m tall"
         if self.other is None:
             return f"lengths are in {self.name}: {tall}, and no other usual unit fits an adult"

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import active_level_db
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.match_table import missing_parts
 from a2g_jax.geometry.retarget.poses import joint_places, rotation_angle, world_rotations
 from a2g_jax.geometry.retarget.rig import Rig, find_rig
 from a2g_jax.inspection.audio_checks import clipped_share, peak_db
@@ -21,11 +22,13 @@ _TRACKED = ("L_Wrist", "R_Wrist", "Head")
 def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
     """The body of a motion, or a note that none is found."""
     try:
-        return find_rig(motion, name=path), []
+        rig = find_rig(motion, name=path)
     except InputError as error:
         message = f"no human body is found in the skeleton ({error})"
         fix = "Facts that need a body (speeds of the hands, the offset) are left out; retargeting is not possible."
         return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
+    fix = "Name these joints in the usual way; retargeting does not move what it does not find."
+    return rig, [Finding("warning", "unmapped", f"{text}.", fix) for text in missing_parts(rig)]
 
 
 def body_places(motion: Motion, rig: Rig) -> Float[np.ndarray, "T J 3"]:
