@@ -161,15 +161,17 @@ def _of_any_rows(parsed: Parsed) -> Float[np.ndarray, "T C"]:
     rows = [line.split() for line in lines]
     counts = np.array([len(row) for row in rows if row])
     tokens = [token for row in rows for token in row]
-    if len(counts) == parsed.frames or np.median(counts) == channels:
-        # A number for a channel is missing or one is too many: a frame a line was meant.
-        _check_counter(parsed, rows)
-        find_fault(parsed)
     whole, rest = divmod(len(tokens), channels)
     ends = np.cumsum(counts)
     frames_start_lines = set(range(channels, len(tokens), channels)) <= set(ends.tolist())
-    fixed_width = len(counts) < 3 or len(set(counts[:-1].tolist())) == 1
-    if rest or not (frames_start_lines or fixed_width):
+    fixed_width = bool(np.all(counts[:-1] == counts[0])) and counts[-1] <= counts[0]
+    whole_rows = not rest and (frames_start_lines or fixed_width)
+    exact = whole_rows and whole == parsed.frames
+    if not exact and (len(counts) == parsed.frames or np.median(counts) == channels):
+        # A number for a channel is missing or one is too many: a frame a line was meant.
+        _check_counter(parsed, rows)
+        find_fault(parsed)
+    if not whole_rows:
         for number, row in enumerate(rows):
             _check_numbers(parsed, number, row)
         promised, last = parsed.frames * channels, max(at for at, row in enumerate(rows) if row)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.geometry.euler import euler_matrices
-from a2g_jax.geometry.joint_names import parse_name
+from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.retarget.poses import joint_places, world_rotations
 from a2g_jax.io.bvh_hierarchy import Joint, Stretch
 
@@ -117,7 +117,7 @@ class _Moves:
         rows = np.unique(np.linspace(0, len(self.values) - 1, _SAMPLE).astype(int))
         true = self._true(means)
         best, least = 0, np.inf
-        for carrier in [0, *(joint for joint in chain if joint in self.moving)]:
+        for carrier in [0, *(joint for joint in chain if joint in self.moving and self._holds_body(chain, joint))]:
             bones = self._bones(chain, carrier, rest, means)
             total = float(np.linalg.norm(self._errors(true, bones, carrier, rows), axis=-1).mean(axis=0).sum())
             if total < 0.95 * least:
@@ -170,12 +170,25 @@ class _Moves:
         places += (true[rows, carrier] - places[:, carrier])[:, None]
         return places - true[rows]
 
-    def _helpers(self, chain, carrier) -> list[int]:
-        """Joints above the carrier, and small or helper branches beside it."""
+    def _inside(self, carrier) -> set[int]:
+        """The carrier and all joints below it."""
         inside = {carrier}
         for joint, parent in enumerate(self.parents):
             if parent in inside:
                 inside.add(joint)
+        return inside
+
+    def _holds_body(self, chain, carrier) -> bool:
+        """Whether a joint's path is that of the body: arms and legs hang below it, or nothing but helpers beside it."""
+        inside, roles = self._inside(carrier), named_joints([joint.name for joint in self.joints])
+        limbs = [roles.get(f"{side}_{part}", -1) for side in "LR" for part in ("Shoulder", "Hip")]
+        if min(limbs) >= 0:
+            return set(limbs) <= inside
+        return len(inside) + len(self._helpers(chain, carrier)) == len(self.parents)
+
+    def _helpers(self, chain, carrier) -> list[int]:
+        """Joints above the carrier, and small or helper branches beside it."""
+        inside = self._inside(carrier)
         branch: dict[int, int] = {}
         for joint, parent in enumerate(self.parents):
             if joint not in inside and joint not in chain:
