@@ -13,10 +13,10 @@ import numpy as np
 from a2g_jax.geometry.skeleton import Skeleton
 
 _SHARES = ((("Shoulder", "Elbow", "Wrist"), 0.332, 1.0), (("Hip", "Knee", "Ankle"), 0.491, 2.0))
-#: A usual stature in metres, and those of people in general: a small child and a very tall adult, with rigs' errors.
-_USUAL, _PEOPLE = 1.7, (0.85, 2.4)
-#: Statures of adults within which an unusual unit has to bring a skeleton.
-_ADULTS = (1.2, 2.2)
+#: Statures of people in general, metres: a small child and a very tall adult, with rigs' errors.
+_PEOPLE = (0.85, 2.4)
+#: Statures of adults to which an unusual unit has to bring a skeleton; their ratio is less than that of any two units.
+_ADULTS = (1.3, 2.2)
 #: Metres in one unit, with names; the first two are used wherever they fit any person.
 UNITS = (
     ("centimetres", 0.01),
@@ -37,8 +37,6 @@ class Unit:
     metres: float
     stature: float | None = None
     """Stature in metres that the limbs then have; None for a skeleton without the limbs of a body."""
-    other: tuple[str, float] | None = None
-    """Another usual unit that people would fit, with the stature."""
     usual: bool = True
     """Whether a usual unit fits a person."""
 
@@ -58,10 +56,10 @@ class Unit:
             )
         if self.plain:
             return f"lengths are in {self.name}; by its limbs the person is {self.stature:.2f} m tall"
-        tall = f"by its limbs the person is then {self.stature:.2f} m tall"
-        if self.other is None:
-            return f"lengths are in {self.name}: {tall}, and no other usual unit fits an adult"
-        return f"lengths are in {self.name}: {tall}; {self.other[0]} are possible, too ({self.other[1]:.2f} m)"
+        return (
+            f"lengths are in {self.name}: by its limbs the person is then {self.stature:.2f} m tall (within 10 %), and "
+            "no other usual unit fits an adult"
+        )
 
 
 def stature(skeleton: Skeleton, roles: Mapping[str, int]) -> float | None:
@@ -99,10 +97,7 @@ def find_unit(units_tall: float, guess: float) -> Unit:
     """
     if _PEOPLE[0] <= units_tall * guess <= _PEOPLE[1]:
         return Unit("centimetres" if guess < 1 else "metres", guess, units_tall * guess)
-    fitting = [(name, metres) for name, metres in UNITS if _ADULTS[0] <= units_tall * metres <= _ADULTS[1]]
-    fitting.sort(key=lambda unit: abs(math.log(units_tall * unit[1] / _USUAL)))
-    if not fitting:
-        return Unit("centimetres" if guess < 1 else "metres", guess, units_tall * guess, usual=False)
-    (name, metres), *others = fitting
-    other = (others[0][0], units_tall * others[0][1]) if others else None
-    return Unit(name, metres, units_tall * metres, other)
+    for name, metres in UNITS:
+        if _ADULTS[0] <= units_tall * metres <= _ADULTS[1]:
+            return Unit(name, metres, units_tall * metres)
+    return Unit("centimetres" if guess < 1 else "metres", guess, units_tall * guess, usual=False)

@@ -24,7 +24,8 @@ def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
     try:
         rig = find_rig(motion, name=path)
     except InputError as error:
-        message = f"no human body is found in the skeleton ({error})"
+        text = str(error).removeprefix(f"{path}: ")
+        message = text if text.startswith("no human body") else f"no human body is found in the skeleton ({text})"
         fix = "Facts that need a body (speeds of the hands, the offset) are left out; retargeting is not possible."
         return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
     fix = "Name these joints in the usual way; retargeting does not move what it does not find."

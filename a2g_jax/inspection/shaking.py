@@ -65,24 +65,24 @@ def check_jitter(motion: Motion, rig: Rig | None = None) -> list[Finding]:
         middle = [rig.roles[part] for part in ("Pelvis", "Head") if part in rig.roles]
         limbs = [joint for role, joint in rig.roles.items() if role.partition("_")[2] in _LIMBS]
         joints = np.array(sorted({*middle, *rig.spine, *rig.neck, *limbs}))
-    noise, white = _noise(_turns(np.asarray(motion.rotations, np.float32)[:, joints]))
+    noise, usual, white = _noise(_turns(np.asarray(motion.rotations, np.float32)[:, joints]))
     slow = max(1.0, (_RATE / motion.fps) ** 2)
     shaking = white & (noise > _MANY)
     one = white & (noise > _ONE * slow)
-    root, root_white = _noise(np.diff(np.asarray(motion.root, np.float64), axis=0)[:, None])
+    root, usual_root, root_white = _noise(np.diff(np.asarray(motion.root, np.float64), axis=0)[:, None])
     findings = []
     if one.any() or (rig is not None and shaking.sum() >= max(6, len(joints) / 2)):
         worst = int(np.argmax(np.where(shaking, noise, 0.0)))
-        name, degrees = motion.skeleton.names[joints[worst]], float(noise[worst])
+        name, degrees = motion.skeleton.names[joints[worst]], float(usual[worst])
         message = (
             f"jitter: {int(shaking.sum())} of {len(joints)} joints shake from frame to frame, most {name} by "
             f"{degrees:.1f} degrees (standard deviation)."
         )
         findings.append(Finding("warning", "jitter", message, _SMOOTH, Place(joint=name), degrees))
     elif root_white[0] and root[0] > _ROOT * slow:
-        message = f"jitter: the root's path shakes by {100 * root[0]:.1f} cm from frame to frame (standard deviation)."
-        place = Place(joint=motion.skeleton.names[0])
-        findings.append(Finding("warning", "jitter", message, _SMOOTH, place, 100 * float(root[0])))
+        cm = 100 * float(usual_root[0])
+        message = f"jitter: the root's path shakes by {cm:.1f} cm from frame to frame (standard deviation)."
+        findings.append(Finding("warning", "jitter", message, _SMOOTH, Place(joint=motion.skeleton.names[0]), cm))
     return findings
 
 
@@ -102,8 +102,10 @@ def _turns(rotations: Float[np.ndarray, "T J 3 3"]) -> Float[np.ndarray, "S J 3"
     return np.degrees(np.stack([x, y, z], axis=-1) / 2)
 
 
-def _noise(steps: Float[np.ndarray, "S J 3"]) -> tuple[Float[np.ndarray, " J"], Bool[np.ndarray, " J"]]:
-    """Standard deviation per axis of noise in calm windows of a signal with these steps, and whether it is white."""
+def _noise(
+    steps: Float[np.ndarray, "S J 3"],
+) -> tuple[Float[np.ndarray, " J"], Float[np.ndarray, " J"], Bool[np.ndarray, " J"]]:
+    """Standard deviation per axis of noise in a signal with these steps, in calm and in usual windows; is it white?"""
     fourth = np.diff(steps, 3, axis=0)
     fifth = np.diff(fourth, axis=0)
     count = len(fifth) // _WINDOW
@@ -115,7 +117,8 @@ def _noise(steps: Float[np.ndarray, "S J 3"]) -> tuple[Float[np.ndarray, " J"], 
     place = np.argmin(np.abs(variances[0] - calm), axis=0)
     ratios = np.take_along_axis(variances[1], place[None], axis=0)[0] / np.maximum(calm, 1e-18)
     typical = np.median(variances[1] / np.maximum(variances[0], 1e-18), axis=0)
-    return np.sqrt(calm / 70), (np.minimum(ratios, typical) > _WHITE)
+    usual = np.sqrt(np.median(variances[0], axis=0) / 70)
+    return np.sqrt(calm / 70), usual, np.minimum(ratios, typical) > _WHITE
 
 
 def check_foot_shake(feet: Float[np.ndarray, "T 2 3"], fps: float) -> list[Finding]:

@@ -55,7 +55,7 @@ def read_bvh(path: str | os.PathLike[str], *, scale: float | None = None) -> Mot
         InputError: the file is not a BVH file or is damaged; the message names the line.
 
     Warns:
-        InputWarning: a unit that is not certain, or bones that move.
+        InputWarning: an unusual unit, or bones that move.
     """
     motion, layout = read_with_layout(path, scale=scale)
     for message in doubts(layout):
@@ -75,7 +75,7 @@ def read_with_layout(path: str | os.PathLike[str], *, scale: float | None = None
 def doubts(layout: Layout) -> list[str]:
     """What is not certain in a motion as it was read, a sentence each."""
     found = []
-    if not layout.unit.plain and (layout.unit.other is not None or not layout.unit.usual):
+    if not layout.unit.plain:
         found.append(str(layout.unit))
     if layout.stretch is not None and layout.stretch.metres > STRETCH:
         found.append(str(layout.stretch))

@@ -11,8 +11,8 @@ from a2g_jax.inspection.inspect import inspect
 from a2g_jax.io.bvh import read_bvh
 
 JOINTS = (
-    ("Hips", "", (0, 95, 0)), ("Spine", "Hips", (0, 10, 0)), ("Chest", "Spine", (0, 14, 0)), ("Neck", "Chest", (0, 20, 0)),
-    ("Head", "Neck", (0, 10, 2)),
+    ("Hips", "", (0, 95, 0)), ("Spine", "Hips", (0, 10, 0)), ("Chest", "Spine", (0, 14, 0)),
+    ("Neck", "Chest", (0, 20, 0)), ("Head", "Neck", (0, 10, 2)),
     *((f"{side}{name}", f"{side}{above}" if above in ("Shoulder", "Arm", "ForeArm", "UpLeg", "Leg", "Foot") else above,
        (sign * x, y, z))
       for side, sign in (("Left", 1), ("Right", -1))
@@ -87,8 +87,8 @@ def test_encodings_of_unicode(encoding, end, tmp_path):
 
 SIDES = {"Left": ("左", "왼쪽 "), "Right": ("右", "오른쪽 ")}
 JAPANESE = {
-    "Hips": "センター", "Spine": "上半身", "Chest": "上半身2", "Neck": "首", "Head": "頭", "Shoulder": "肩", "Arm": "腕",
-    "ForeArm": "ひじ", "Hand": "手首", "UpLeg": "足", "Leg": "ひざ", "Foot": "足首", "ToeBase": "つま先",
+    "Hips": "センター", "Spine": "上半身", "Chest": "上半身2", "Neck": "首", "Head": "頭", "Shoulder": "肩",
+    "Arm": "腕", "ForeArm": "ひじ", "Hand": "手首", "UpLeg": "足", "Leg": "ひざ", "Foot": "足首", "ToeBase": "つま先",
 }  # fmt: skip
 CHINESE = {
     "Hips": "骨盆", "Spine": "脊柱1", "Chest": "脊柱2", "Neck": "颈", "Head": "头", "Shoulder": "锁骨", "Arm": "上臂",

@@ -46,7 +46,9 @@ def find_parts(
     unsided = None
     if missing := [role for role in _NEEDED if role not in roles]:
         shape = joints_by_shape(skeleton)
-        if shape is None:
+        named = [role for role in _NEEDED if role in roles and not role.endswith("Wrist")]
+        # Two fingers, brows or legs of a table are a pair of branches, too.
+        if shape is None or not (named or "L_Hip" in shape):
             raise InputError(
                 f"{name}: no human body: no {', no '.join(missing)} found, neither by names nor by the shape of the "
                 f"tree; name the joints in the usual way or give them by hand. It has "
