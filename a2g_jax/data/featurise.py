@@ -79,7 +79,8 @@ def prepare_recording(
     mel, fps = features.mel, features.fps
     if recording.sample_rate != mel.sample_rate:
         raise InputError(f"{where}: has {recording.sample_rate} Hz audio; expected {mel.sample_rate} Hz.")
-    whole, notes = recording.motion, ()
+    notes: tuple[str, ...] = ()
+    whole = recording.motion if isinstance(recording, Recording) else None
     if isinstance(recording, Recording) and recording.sources:
         recording, notes = without_calibration(recording)
     audio_seconds, motion_seconds = len(recording.audio) / recording.sample_rate, recording.motion.seconds

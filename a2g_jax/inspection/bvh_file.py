@@ -62,8 +62,9 @@ def scan_bvh(path: Path) -> BvhFile:
         InputError: no skeleton, or no motion with the usual header.
     """
     parsed = parse_bvh(path, read_text(path))
+    findings: list[Finding] = []
     try:
-        values, findings = values_of(parsed), []
+        values = values_of(parsed)
         count = len(values)
     except InputError as error:
         if not any(line.strip() for line in parsed.lines):
@@ -118,8 +119,7 @@ def check_layout(layout: Layout) -> list[Finding]:
     unit = layout.unit
     if not unit.plain:
         fix = "" if unit.usual else "If you know it, name it when reading (scale of read_bvh)."
-        severity = "info" if unit.usual else "warning"
-        findings.append(Finding(severity, "unit", f"{unit}.", fix, value=unit.metres))
+        findings.append(Finding("info" if unit.usual else "warning", "unit", f"{unit}.", fix, value=unit.metres))
     if layout.carrier:
         name = layout.joints[layout.carrier].name
         message = f"the path of the body is in the position channels of {name}; it is read as that of the root above."

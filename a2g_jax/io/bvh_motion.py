@@ -84,7 +84,8 @@ def parse_bvh(path: object, text: str) -> Parsed:
 
 def _skip(text: str, at: int, line: int) -> tuple[int, int]:
     """The place of the next character that is no space, and its line; the end of the text if there is none."""
-    stop = _SPACE.match(text, at).end()
+    spaces = _SPACE.match(text, at)
+    stop = spaces.end() if spaces else at
     return stop, line + text.count("\n", at, stop)
 
 

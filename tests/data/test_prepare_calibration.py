@@ -64,7 +64,7 @@ def test_the_command_says_so_and_smooths(recording, tmp_path, capsys):
     assert "take1: frame 0" in capsys.readouterr().err
     smooth = prepare_data_set("folder", source, tmp_path / "smooth", FEATURES, workers=1, smooth=3.0)
     again = prepare_data_set("folder", source, tmp_path / "again", FEATURES, workers=1)
-    one, two, three = (np.asarray(corpus.arrays["pose"]) for corpus in (plain, smooth, again))
+    one, two, three = (np.asarray(corpus.pose) for corpus in (plain, smooth, again))
     assert one.shape == two.shape
     assert 1e-4 < np.abs(one - two).max() < 0.2
     np.testing.assert_array_equal(one, three)

@@ -8,6 +8,7 @@ from a2g_jax.geometry.retarget.match import Match, Pair, body_places
 from a2g_jax.geometry.retarget.poses import angle_between
 from a2g_jax.geometry.retarget.rig import Rig
 
+_Row = tuple[str, str, str, str, str, str]
 #: Hands with more joints below the wrist are one row.
 _FOLD = 3
 
@@ -17,7 +18,7 @@ def table(match: Match) -> str:
 
     The joints below a hand share a line.
     """
-    rows = [("source", "target", "part", "found by", "rest angle", "length")]
+    rows: list[_Row] = [("source", "target", "part", "found by", "rest angle", "length")]
     matched_sources = {pair.source for pair in match.pairs}
     pairs = {pair.target: pair for pair in match.pairs}
     shared = {share.target: share for share in match.shares}
@@ -80,7 +81,7 @@ def match_warnings(match: Match) -> list[str]:
     return found
 
 
-def _hand_row(match: Match, side: str, joints: list[int], pairs: dict[int, Pair]) -> tuple[str, ...]:
+def _hand_row(match: Match, side: str, joints: list[int], pairs: dict[int, Pair]) -> _Row:
     names = match.target.skeleton.names
     found = [pairs[joint] for joint in joints if joint in pairs]
     how = [f"{kind} ({count})" for kind, count in Counter(pair.how for pair in found).items()]
