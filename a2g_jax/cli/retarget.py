@@ -50,7 +50,6 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     from a2g_jax.geometry.motion import resample
     from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_rig
     from a2g_jax.geometry.retarget.calibration import calibration_frames
-    from a2g_jax.geometry.retarget.match_table import match_warnings
     from a2g_jax.geometry.smooth import smooth
     from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh, write_like
 
@@ -75,7 +74,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     else:
         errors = write_like(out, moved, layout)
     print(match.table())
-    for doubt in match_warnings(match):
+    for doubt in match.warnings():
         print(f"warning: {doubt}.")
     print(f"{out}: {moved.frames} frames of {moved.skeleton.joints} joints at {moved.fps:g} fps")
     for joint, degrees in errors.items():

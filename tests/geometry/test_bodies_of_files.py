@@ -9,7 +9,6 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.anthropometry import find_unit, stature
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget
-from a2g_jax.geometry.retarget.match_table import match_warnings
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh
@@ -164,7 +163,7 @@ def test_neck_and_head_of_rigify():
     assert not rig.by_shape
     plain, _ = Spec().build(Poses.random(4, 4))
     match = match_rigs(find_rig(plain), rig)
-    assert match_warnings(match) == []
+    assert match.warnings() == []
     assert joints["Head"] in {pair.target for pair in match.pairs}
 
 
@@ -186,9 +185,9 @@ def test_a_head_that_is_not_found_is_warned_of():
         names[joint] = f"thing{joint}"
     headless = Skeleton(motion.skeleton.offsets, tuple(names), motion.skeleton.parents)
     plain = find_rig(motion)
-    (text,) = match_warnings(match_rigs(plain, find_rig(headless)))
+    (text,) = match_rigs(plain, find_rig(headless)).warnings()
     assert "no neck and no head" in text
-    assert match_warnings(match_rigs(plain, plain)) == []
+    assert match_rigs(plain, plain).warnings() == []
 
 
 def test_hands_share_a_row():

@@ -4,39 +4,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import path_up
 from a2g_jax.geometry.joint_names import parse_name
-from a2g_jax.geometry.retarget.poses import joint_places
+from a2g_jax.geometry.retarget.match_table import body_frame_of, body_places, missing_parts, table
+from a2g_jax.geometry.retarget.pairs import Pair, Share
 from a2g_jax.geometry.retarget.rest import ankle_height
 from a2g_jax.geometry.retarget.rig import Rig
 
 #: Rigid segments: a joint between their two ends is a twist bone, which twists but does not bend.
 _RIGID = {"Shoulder": "Elbow", "Elbow": "Wrist", "Hip": "Knee", "Knee": "Ankle"}
 _NEXT = {**_RIGID, "Collar": "Shoulder", "Ankle": "Foot", "Wrist": "Middle1"}
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A joint of the target and the joint of the source whose pose it copies."""
-
-    target: int
-    source: int
-    role: str
-    how: str
-    """``"name"``, ``"shape"`` (topology), ``"order"`` (spines and necks) or ``"same name"``."""
-
-
-@dataclass(frozen=True)
-class Share:
-    """A joint of the target between two matched ones, posed by interpolation between their poses."""
-
-    target: int
-    above: int
-    below: int
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +32,20 @@ class Match:
     """Metres by which the target's hips are raised after scaling, so that its soles are where the source's are."""
 
     def table(self) -> str:
-        """Text with a line for each target joint, and one for the fingers of a hand; see :mod:`.match_table`."""
-        # Here, since the table shows a match.
-        from a2g_jax.geometry.retarget.match_table import table
+        """Text with a line for each target joint and one for the fingers of a hand: how they were matched."""
+        return table(self.source, self.target, self.pairs, self.shares, self.scale, self.lift, self.bones())
 
-        return table(self)
+    def warnings(self) -> list[str]:
+        """Head, neck or hands that are not moved, a sentence each."""
+        found = [f"the {what}: {text}" for what, rig in (("source", self.source), ("target", self.target))
+                 for text in missing_parts(rig)]  # fmt: skip
+        matched = {pair.target for pair in self.pairs}
+        for role, label in (("Head", "head"), ("L_Wrist", "left hand"), ("R_Wrist", "right hand")):
+            joint = self.target.roles.get(role)
+            if joint is not None and joint not in matched and self.source.neck + self.source.spine:
+                name = self.target.skeleton.names[joint]
+                found.append(f"the target's {label} ({name}) has no match and stays at rest")
+        return found
 
     def bones(self) -> list[tuple[str, tuple[int, int], tuple[int, int]]]:
         """Bones that both rigs have: the part, then (joint, joint below) in the source and in the target."""
@@ -188,17 +176,7 @@ def _scale(source: Rig, target: Rig) -> tuple[float, float]:
     scale = float(lengths[1] / lengths[0])
     if not legs:
         return scale, 0.0
-    heights = [ankle_height(rig.skeleton, body_places(rig), _body(rig).T @ rig.rest_world, rig.roles) for rig in rigs]
+    heights = [
+        ankle_height(rig.skeleton, body_places(rig), body_frame_of(rig).T @ rig.rest_world, rig.roles) for rig in rigs
+    ]
     return scale, heights[1] - scale * heights[0]
-
-
-def _body(rig: Rig) -> Float[np.ndarray, "3 3"]:
-    """``R_rest_body``, which is the anatomical frame of any joint of the trunk at rest."""
-    chest = rig.roles["Chest"]
-    return rig.rest_world[chest] @ rig.align[chest]
-
-
-def body_places(rig: Rig) -> Float[np.ndarray, "J 3"]:
-    """Positions in the reference pose, in the body frame."""
-    offsets = np.asarray(rig.skeleton.offsets, np.float64)
-    return joint_places(rig.rest_world, offsets, rig.skeleton.parents) @ _body(rig)

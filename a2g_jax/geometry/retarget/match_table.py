@@ -1,49 +1,61 @@
 """A match of two rigs as text, and what it leaves out."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
-from a2g_jax.geometry.retarget.match import Match, Pair, body_places
-from a2g_jax.geometry.retarget.poses import angle_between
+from a2g_jax.geometry.retarget.pairs import Pair, Share
+from a2g_jax.geometry.retarget.poses import angle_between, joint_places
 from a2g_jax.geometry.retarget.rig import Rig
 
+#: A part with (joint, joint below) in the source and in the target.
+Bone = tuple[str, tuple[int, int], tuple[int, int]]
 _Row = tuple[str, str, str, str, str, str]
 #: Hands with more joints below the wrist are one row.
 _FOLD = 3
 
 
-def table(match: Match) -> str:
+def table(
+    source: Rig,
+    target: Rig,
+    matched: Sequence[Pair],
+    shares: Sequence[Share],
+    scale: float,
+    lift: float,
+    bones: Sequence[Bone],
+) -> str:
     """Text with a line for each target joint: source joints, part, how matched, angle at rest, ratio of bone lengths.
 
     The joints below a hand share a line.
     """
     rows: list[_Row] = [("source", "target", "part", "found by", "rest angle", "length")]
-    matched_sources = {pair.source for pair in match.pairs}
-    pairs = {pair.target: pair for pair in match.pairs}
-    shared = {share.target: share for share in match.shares}
-    hands = {joint: side for side in "LR" for joint in below_wrist(match.target, side)}
+    matched_sources = {pair.source for pair in matched}
+    pairs = {pair.target: pair for pair in matched}
+    shared = {share.target: share for share in shares}
+    hands = {joint: side for side in "LR" for joint in below_wrist(target, side)}
     for joint in sorted(pairs):
         if joint in hands:
             continue
         pair = pairs[joint]
-        composed = _composed(match.source.skeleton.parents, pair.source, matched_sources)
-        names = "+".join(match.source.skeleton.names[one] for one in composed)
-        angle, ratio = _bone(match, pair)
-        rows.append((names, match.target.skeleton.names[joint], pair.role, pair.how, angle, ratio))
+        composed = _composed(source.skeleton.parents, pair.source, matched_sources)
+        names = "+".join(source.skeleton.names[one] for one in composed)
+        angle, ratio = _bone(source, target, bones, pair)
+        rows.append((names, target.skeleton.names[joint], pair.role, pair.how, angle, ratio))
     for side in "LR":
         if joints := [joint for joint, owner in hands.items() if owner == side]:
-            rows.append(_hand_row(match, side, joints, pairs))
-    for joint, name in enumerate(match.target.skeleton.names):
+            rows.append(_hand_row(target, side, joints, pairs))
+    for joint, name in enumerate(target.skeleton.names):
         if joint in shared:
             rows.append(("-", name, "", f"share {shared[joint].weight:.2f}", "", ""))
         elif joint not in pairs and joint not in hands:
             rows.append(("-", name, "", "at rest", "", ""))
     widths = [max(len(row[column]) for row in rows) for column in range(6)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    for what, rig in (("source", match.source), ("target", match.target)):
+    for what, rig in (("source", source), ("target", target)):
         lines.append(f"{what}: {'parts by shape; ' if rig.by_shape else ''}{'; '.join(rig.notes)}")
-    lines.append(f"lengths times {match.scale:.3f}, hips raised by {100 * match.lift:.1f} cm")
+    lines.append(f"lengths times {scale:.3f}, hips raised by {100 * lift:.1f} cm")
     return "\n".join(lines)
 
 
@@ -69,39 +81,25 @@ def missing_parts(rig: Rig) -> list[str]:
     return [f"no head is found above {rig.skeleton.names[last]} (which has {', '.join(unknown[:3])})"]
 
 
-def match_warnings(match: Match) -> list[str]:
-    """Head, neck or hands that are not moved, a sentence each."""
-    found = [f"the {what}: {text}" for what, rig in (("source", match.source), ("target", match.target))
-             for text in missing_parts(rig)]  # fmt: skip
-    matched = {pair.target for pair in match.pairs}
-    for role, label in (("Head", "head"), ("L_Wrist", "left hand"), ("R_Wrist", "right hand")):
-        joint = match.target.roles.get(role)
-        if joint is not None and joint not in matched and match.source.neck + match.source.spine:
-            found.append(f"the target's {label} ({match.target.skeleton.names[joint]}) has no match and stays at rest")
-    return found
-
-
-def _hand_row(match: Match, side: str, joints: list[int], pairs: dict[int, Pair]) -> _Row:
-    names = match.target.skeleton.names
+def _hand_row(target: Rig, side: str, joints: list[int], pairs: dict[int, Pair]) -> _Row:
+    names = target.skeleton.names
     found = [pairs[joint] for joint in joints if joint in pairs]
     how = [f"{kind} ({count})" for kind, count in Counter(pair.how for pair in found).items()]
     if len(found) < len(joints):
         how.append(f"at rest ({len(joints) - len(found)})")
     source = f"{len(found)} joints" if found else "-"
-    wrist = names[match.target.roles[f"{side}_Wrist"]]
+    wrist = names[target.roles[f"{side}_Wrist"]]
     return (source, f"{len(joints)} joints below {wrist}", f"{side} fingers", ", ".join(how), "", "")
 
 
-def _bone(match: Match, pair: Pair) -> tuple[str, str]:
-    for role, (s0, s1), (t0, t1) in match.bones():
+def _bone(source: Rig, target: Rig, bones: Sequence[Bone], pair: Pair) -> tuple[str, str]:
+    for role, (s0, s1), (t0, t1) in bones:
         if role == pair.role:
-            first = body_places(match.source)
-            second = body_places(match.target)
-            source, target = first[s1] - first[s0], second[t1] - second[t0]
-            if np.linalg.norm(source) < 1e-6 or np.linalg.norm(target) < 1e-6:
+            first, second = body_places(source), body_places(target)
+            theirs, ours = first[s1] - first[s0], second[t1] - second[t0]
+            if np.linalg.norm(theirs) < 1e-6 or np.linalg.norm(ours) < 1e-6:
                 return "", ""
-            ratio = np.linalg.norm(target) / np.linalg.norm(source)
-            return f"{angle_between(source, target):.1f}", f"{ratio:.2f}"
+            return f"{angle_between(theirs, ours):.1f}", f"{np.linalg.norm(ours) / np.linalg.norm(theirs):.2f}"
     return "", ""
 
 
@@ -111,3 +109,15 @@ def _composed(parents: tuple[int, ...], joint: int, matched: set[int]) -> list[i
     while parents[joints[0]] >= 0 and parents[joints[0]] not in matched:
         joints.insert(0, parents[joints[0]])
     return joints
+
+
+def body_frame_of(rig: Rig) -> Float[np.ndarray, "3 3"]:
+    """``R_rest_body``, which is the anatomical frame of any joint of the trunk at rest."""
+    chest = rig.roles["Chest"]
+    return rig.rest_world[chest] @ rig.align[chest]
+
+
+def body_places(rig: Rig) -> Float[np.ndarray, "J 3"]:
+    """Positions in the reference pose, in the body frame."""
+    offsets = np.asarray(rig.skeleton.offsets, np.float64)
+    return joint_places(rig.rest_world, offsets, rig.skeleton.parents) @ body_frame_of(rig)
