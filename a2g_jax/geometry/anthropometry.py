@@ -13,6 +13,8 @@ import numpy as np
 from a2g_jax.geometry.skeleton import Skeleton
 
 _SHARES = ((("Shoulder", "Elbow", "Wrist"), 0.332, 1.0), (("Hip", "Knee", "Ankle"), 0.491, 2.0))
+#: Largest ratios of left and right, and of the statures by arms and by legs.
+_ALIKE, _PROPORTIONS = 1.15, 1.6
 #: Statures of people in general, metres: a small child and a very tall adult, with rigs' errors.
 _PEOPLE = (0.85, 2.4)
 #: Statures of adults to which an unusual unit has to bring a skeleton; their ratio is less than that of any two units.
@@ -63,18 +65,25 @@ class Unit:
 
 
 def stature(skeleton: Skeleton, roles: Mapping[str, int]) -> float | None:
-    """Stature of a person with the limbs of a skeleton, in its unit; None without two arms of some length.
+    """Stature of a person with the limbs of a skeleton, in its unit; None if they are not those of a person.
+
+    Left and right have to be alike, and arms and legs to belong to statures that are.
 
     Args:
         roles: joint of each part, as of a rig.
     """
-    total = weights = 0.0
+    found = []
     for parts, share, weight in _SHARES:
         lengths = [_along(skeleton, [roles.get(f"{side}_{part}", -1) for part in parts]) for side in "LR"]
         if min(lengths) > 0:
-            total += weight * math.log(sum(lengths) / 2 / share)
-            weights += weight
-    return math.exp(total / weights) if weights else None
+            if max(lengths) > _ALIKE * min(lengths):
+                return None
+            found.append((math.log(sum(lengths) / 2 / share), weight))
+    logs = [log for log, _ in found]
+    if not found or max(logs) - min(logs) > math.log(_PROPORTIONS):
+        return None
+    weights = sum(weight for _, weight in found)
+    return math.exp(sum(log * weight for log, weight in found) / weights)
 
 
 def _along(skeleton: Skeleton, chain: list[int]) -> float:

@@ -66,7 +66,8 @@ def parse_bvh(path: object, text: str) -> Parsed:
     if not found:
         fail(path, line, f"expected 'Frames: <count>' after MOTION; got {_line_at(text, at)}.")
     if not re.fullmatch(r"[0-9]{1,15}", found[1]) or int(found[1]) == 0:
-        fail(path, line, f"expected a positive number of frames; got {shown(found[1])}{comma_hint(found[1])}.")
+        hint = " (a decimal or thousands comma: write a whole number)" if "," in found[1] else ""
+        fail(path, line, f"expected a positive number of frames; got {shown(found[1])}{hint}.")
     frames = int(found[1])
     after, line = _skip(text, found.end(), line)
     found = _FRAME_TIME.match(text, after)
