@@ -1,4 +1,4 @@
-"""Errors for invalid input, and for interruptions."""
+"""Errors for invalid input and interruptions, and warnings of doubtful input."""
 
 
 class A2GError(Exception):
@@ -11,3 +11,7 @@ class Interrupted(A2GError):
 
 class InputError(A2GError, ValueError):
     """A file or value that cannot be used: the message names it, the place in it and the fix."""
+
+
+class InputWarning(UserWarning):
+    """A file that can be used, with a doubt; the command line prints one as a single line and goes on."""

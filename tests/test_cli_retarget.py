@@ -131,8 +131,8 @@ def test_errors_are_one_line_and_leave_nothing(files):
     plain = ["--to", "body", "--out", out]
     for arguments, message in (
         ([files / "no.bvh", *plain], "no.bvh: there is no such file"),
-        ([files / "chain.bvh", *plain], "chain.bvh: no L_Shoulder"),
-        ([files / "a.bvh", "--to", files / "chain.bvh", "--out", out], "chain.bvh: no L_Shoulder"),
+        ([files / "chain.bvh", *plain], "chain.bvh: no human body: no L_Shoulder"),
+        ([files / "a.bvh", "--to", files / "chain.bvh", "--out", out], "chain.bvh: no human body: no L_Shoulder"),
         ([files / "a.bvh", "--to", "legs", "--out", out], "legs: there is no such file"),
         ([files / "b.bvh", "--to", "upper-body", "--out", out], "lacks joints of BEAT's 47"),
         ([files / "a.bvh", "--to", "body", "--out", files / "x.npz"], "ends in .bvh"),

@@ -61,3 +61,8 @@ def formats(known: tuple[str, ...]) -> Callable[[str], tuple[str, ...]]:
             raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
 
     return convert
+
+
+#: A cutoff of ``--smooth``.
+cutoff = number(float, 0.5, 60, "a frequency from 0.5 to 60 Hz")
+SMOOTH_HELP = "filter out what is faster than HZ, such as shaking joints; timing stays (default: off; alone: %(const)g)"

@@ -3,13 +3,14 @@
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
 from a2g_jax.cli import demo, evaluate, generate, inspect, label, prepare, retarget, talk, train
-from a2g_jax.errors import A2GError, Interrupted
+from a2g_jax.errors import A2GError, InputWarning, Interrupted
 
 #: The module of each command: ``DESCRIPTION``, ``add_arguments(parser)`` and ``run(options, extra)``, which returns
 #: the exit status or None for 0. With ``TAKES_SETTINGS``, unknown flags are ``extra``.
@@ -66,7 +67,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"a2g: unknown argument {extra[0]} (see 'a2g {options.command} --help')", file=sys.stderr)
         return 2
     try:
-        status: int = COMMANDS[options.command].run(options, extra) or 0
+        with warnings.catch_warnings():
+            # A doubt about a file is a line, not a place in the source.
+            warnings.simplefilter("always", InputWarning)
+            warnings.showwarning = _show(warnings.showwarning)
+            status: int = COMMANDS[options.command].run(options, extra) or 0
         sys.stdout.flush()
         return status
     except KeyboardInterrupt:
@@ -82,6 +87,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status, line = _explain(error)
         print(f"a2g: {' '.join(line.split())}", file=sys.stderr)
         return status
+
+
+def _show(otherwise: Callable[..., None]) -> Callable[..., None]:
+    """A handler that prints an ``InputWarning`` as one line and gives any other to a handler."""
+
+    def show(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
+        if issubclass(category, InputWarning):
+            print(f"a2g: note: {' '.join(str(message).split())}", file=sys.stderr)
+        else:
+            otherwise(message, category, *where, **more)
+
+    return show
 
 
 def _explain(error: Exception) -> tuple[int, str]:

@@ -5,10 +5,23 @@ import dataclasses
 import textwrap
 from typing import TYPE_CHECKING
 
-from a2g_jax.cli.argument_types import CHANNEL, TIER, channel, count, frame_rate, natural, positive, seed, share
+from a2g_jax.cli.argument_types import (
+    CHANNEL,
+    SMOOTH_HELP,
+    TIER,
+    channel,
+    count,
+    cutoff,
+    frame_rate,
+    natural,
+    positive,
+    seed,
+    share,
+)
 from a2g_jax.cli.paths import existing_file, existing_folder, existing_run
 from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.cutoff import CUTOFF
 from a2g_jax.geometry.pose_kinds import WIDTHS
 
 if TYPE_CHECKING:
@@ -23,17 +36,8 @@ READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
 _GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
 _RECORDED = (
-    "source",
-    "joints",
-    "random_split",
-    "skip_broken",
-    "limit",
-    "labels",
-    "confidence",
-    "labelled",
-    "for_run",
-    "channel",
-    "tier",
+    *("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled", "for_run"),
+    *("channel", "tier", "smooth"),
 )
 #: Flags that a run decides with ``--for``.
 _OF_RUN = ("features", "fps", "pose", "joints")
@@ -104,6 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     recorded.add_argument("--channel", type=channel, metavar="left|right|N", help=CHANNEL)
     recorded.add_argument("--tier", metavar="NAME", help=TIER)
+    recorded.add_argument("--smooth", type=cutoff, nargs="?", const=CUTOFF, metavar="HZ", help=SMOOTH_HELP)
     recorded.add_argument("--labelled", action="store_true", help="leave out recordings without an emotion")
     generated = parser.add_argument_group("generated talk")
     generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
@@ -243,6 +248,7 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         skeleton=skeleton,
         channel=options.channel,
         tier=options.tier,
+        smooth=options.smooth,
     )
 
 

@@ -3,9 +3,10 @@
 import argparse
 from pathlib import Path
 
-from a2g_jax.cli.argument_types import frame_rate
+from a2g_jax.cli.argument_types import SMOOTH_HELP, cutoff, frame_rate
 from a2g_jax.cli.paths import existing_file
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.cutoff import CUTOFF
 
 DESCRIPTION = (
     "Transfer a motion from one rig to another: any humanoid BVH to any other, or to the body joints that models train"
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fps", type=frame_rate, metavar="F", help="frames per second of the result (default: the source's)"
     )
+    parser.add_argument("--smooth", type=cutoff, nargs="?", const=CUTOFF, metavar="HZ", help=SMOOTH_HELP)
 
 
 def run(options: argparse.Namespace, _extra: list[str]) -> None:
@@ -47,6 +49,8 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     from a2g_jax.geometry.mirror import mirror
     from a2g_jax.geometry.motion import resample
     from a2g_jax.geometry.retarget import body_skeleton, find_rig, match_rigs, retarget, upper_body_rig
+    from a2g_jax.geometry.retarget.calibration import calibration_frames
+    from a2g_jax.geometry.smooth import smooth
     from a2g_jax.io.bvh import read_bvh, read_with_layout, write_bvh, write_like
 
     source_path = Path(options.source)
@@ -61,6 +65,8 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     match = match_rigs(source, target)
     moved = mirror(motion, source) if options.mirror else motion
     moved = retarget(moved, match)
+    if options.smooth is not None:
+        moved = smooth(moved, options.smooth, calibration_frames(motion))
     moved = moved if options.fps is None else resample(moved, options.fps)
     errors: dict[str, float] = {}
     if layout is None:
@@ -68,6 +74,8 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     else:
         errors = write_like(out, moved, layout)
     print(match.table())
+    for doubt in match.warnings():
+        print(f"warning: {doubt}.")
     print(f"{out}: {moved.frames} frames of {moved.skeleton.joints} joints at {moved.fps:g} fps")
     for joint, degrees in errors.items():
         print(f"{joint} has too few rotation channels in the target: off by up to {degrees:.1f} degrees")

@@ -1,6 +1,7 @@
 """Preparation of a whole corpus with a progress bar: generated, or from the recordings of a data set."""
 
 import os
+import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -19,7 +20,7 @@ from a2g_jax.data.generated import TalkerOptions, generate_rows
 from a2g_jax.data.on_demand import OnDemand, split_roles
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, InputWarning
 from a2g_jax.features.speech_likeness import why_no_speech
 from a2g_jax.geometry.pose_space import interchangeable
 from a2g_jax.geometry.skeleton import Skeleton
@@ -92,6 +93,7 @@ def prepare_data_set(
     skeleton: Skeleton | None = None,
     channel: int | None = None,
     tier: str | None = None,
+    smooth: float | None = None,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
@@ -110,6 +112,7 @@ def prepare_data_set(
         skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
         channel: of audio files with several, from 1 on; the mean of all if None.
         tier: of TextGrids with several, or the speaker it is of; the first one of words if None.
+        smooth: frequency in Hz above which motions are filtered (:func:`~a2g_jax.geometry.smooth.smooth`); None: not.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
@@ -131,6 +134,8 @@ def prepare_data_set(
     recipe |= {name: value for name, value in (("channel", channel), ("tier", tier)) if value is not None}
     if skeleton is not None:
         recipe["body"] = skeleton_to_json(skeleton)
+    if smooth is not None:
+        recipe["smooth"] = smooth
     read = partial(
         _read_rows,
         name=name,
@@ -140,6 +145,7 @@ def prepare_data_set(
         skeleton=skeleton,
         channel=channel,
         tier=tier,
+        smooth=smooth,
     )
     items = [Item(take.name, take.sources) for take in takes]
     groups = {take.name: take.group for take in takes if take.group}
@@ -234,17 +240,21 @@ def _read_rows(
     skeleton: Skeleton | None,
     channel: int | None = None,
     tier: str | None = None,
+    smooth: float | None = None,
 ) -> Prepared | Skipped:
     try:
-        with reading(channel, tier) as choices:
+        # Doubts about a file are shown by the process that has the progress bar.
+        with reading(channel, tier) as choices, warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", InputWarning)
             recording = read_take(take, name, features.mel.sample_rate)
         if labelled and not recording.emotion:
             return Skipped(take.name, take.sources, f"{take.sources[0]}: has no emotion label.")
         if reason := why_no_speech(recording.audio, recording.sample_rate):
             choices.notes.append(f"{take.sources[0]}: no speech is found: {reason}.")
-        prepared = prepare_recording(recording, features, take.split, skeleton)
-        return replace(prepared, notes=(*choices.notes, *prepared.notes))
+        prepared = prepare_recording(recording, features, take.split, skeleton, smooth)
     except InputError as error:
         if not skip_broken:
             raise
         return Skipped(take.name, take.sources, str(error))
+    doubts = tuple(str(one.message) for one in found if issubclass(one.category, InputWarning))
+    return replace(prepared, notes=(*choices.notes, *doubts, *prepared.notes))

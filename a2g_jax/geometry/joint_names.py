@@ -2,13 +2,15 @@
 
 Recognises the names of BEAT, ZeroEGGS, Trinity and Mixamo (``LeftForeArm``), Talking With Hands (``b_l_forearm``), SMPL
 and SMPL-X (``L_Elbow``, ``left_elbow``), Unreal (``lowerarm_l``), 3ds Max Biped (``Bip01 L Forearm``), Blender
-(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``) and similar ones, with any
-prefix, case or separator.
+(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``), MikuMikuDance (``左ひじ``) and
+similar ones, with any prefix, case or separator.
 """
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+from a2g_jax.geometry.joint_words import in_english
 
 FINGERS = ("Index", "Middle", "Pinky", "Ring", "Thumb")
 """The five fingers in SMPL-X order."""
@@ -37,14 +39,14 @@ _BIPED_FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 #: Names of the parts that have sides. The first name that a rig has wins; a name of two parts is that of the first
 #: part without a joint ("shoulder" is the upper arm in SMPL-X, the collar elsewhere).
 _SIDED: tuple[tuple[str, tuple[str, ...]], ...] = (
-    ("Hip", ("upleg", "upperleg", "thigh", "femur", "hip", "upperleg01")),
-    ("Knee", ("lowerleg", "calf", "shin", "knee", "lowleg", "tibia", "leg", "lowerleg01")),
+    ("Hip", ("upleg", "upperleg", "legupper", "thigh", "femur", "hip", "upperleg01")),
+    ("Knee", ("lowerleg", "leglower", "calf", "shin", "knee", "lowleg", "tibia", "leg", "lowerleg01")),
     ("Hip", ("leg",)),
     ("Ankle", ("ankle", "foot")),
     ("Foot", ("toebase", "toe", "toes", "ball", "toe0", "forefoot", "foot")),
-    ("Shoulder", ("arm", "upperarm", "uparm", "humerus", "shldr", "shoulder", "upperarm01")),
+    ("Shoulder", ("arm", "upperarm", "uparm", "humerus", "armupper", "shldr", "shoulder", "upperarm01")),
     ("Collar", ("clavicle", "collar", "collarbone", "shoulder", "shoulderblade", "shoulder01")),
-    ("Elbow", ("forearm", "lowerarm", "elbow", "lowarm", "radius", "lowerarm01", "arm1")),
+    ("Elbow", ("forearm", "lowerarm", "armlower", "elbow", "lowarm", "radius", "lowerarm01", "arm1")),
     ("Wrist", ("wrist", "hand")),
 )
 _MIDDLE: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -52,6 +54,9 @@ _MIDDLE: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Neck", ("neck", "neck0", "neck00", "neck01", "neck1", "cervical")),
     ("Head", ("head", "head0", "head01")),
 )
+#: Words after the name of a joint of the middle (``neck.x``, ``Head_M``), and of any (``forearm_stretch.l``).
+_MIDDLE_MARKS = frozenset(("m", "x", "c", "mid", "center"))
+_MARKS = frozenset(("stretch",))
 _SIDED_NAMES = {name for _, names in _SIDED for name in names}
 
 
@@ -96,13 +101,16 @@ class JointName:
 
 def parse_name(name: str) -> JointName:
     """Split one joint name."""
-    words = [word.lower() for word in _WORD.findall(re.split("[:|]", name)[-1])]
+    words = [word.lower() for word in _WORD.findall(re.split("[:|]", in_english(name))[-1])]
     while len(words) > 1 and words[0] in _CASING:
         words = words[1:]
         # With "Bip01" its number.
         if len(words) > 1 and words[0].isdigit():
             words = words[1:]
     while len(words) > 1 and words[-1] in _CASING and words[-1] not in ("b", "p", "m", "f", "c"):
+        words = words[:-1]
+    words = [word for word in words if word not in _MARKS] or words
+    if len(words) > 1 and words[-1] in _MIDDLE_MARKS:
         words = words[:-1]
     for at, word in enumerate(words):
         if word in _SIDE and len(words) > 1:

@@ -1,9 +1,5 @@
 """A BVH file as written: header, channels, and as much of the motion as is readable."""
 
-import re
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,30 +10,31 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.inspection.finding import Finding, Place
 from a2g_jax.inspection.motion_checks import FLIP_DEGREES, rotation_steps
-from a2g_jax.io.bvh import read_bvh
-from a2g_jax.io.bvh_hierarchy import Joint, parse_hierarchy
-from a2g_jax.io.files import check_readable
+from a2g_jax.io.bvh_hierarchy import Joint, Layout
+from a2g_jax.io.bvh_motion import Parsed, count_remedy, parse_bvh, values_of
+from a2g_jax.io.bvh_reader import STRETCH
+from a2g_jax.io.bvh_text import read_text
 
 #: Degrees between two frames from which the jump of a channel is a full turn.
 WRAP = 180.0
-_HEADER = re.compile(r"\A(\s*Frames?\s*+:?\s*+)([0-9]{1,15})(\s*?\n\s*Frame\s*+Time\s*+:?\s*+)(\S{1,40})[^\n]*\n", re.I)
-_MOTION = re.compile(r"^[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False)
 class BvhFile:
     """The contents of a BVH file, consistent or not."""
 
-    joints: list[Joint]
-    claimed: int
-    """Number of frames by the header."""
-    frame_time: str
-    rows: list[str]
-    """Lines of the motion that are not empty."""
-    head: str
-    """The text up to the number of frames."""
-    middle: str
-    """The text between it and the motion."""
+    parsed: Parsed
+    values: Float[np.ndarray, "T C"]
+    """Numbers of the frames before the first fault."""
+    frames: int
+    """Number of frames in the file, readable or not."""
+    findings: list[Finding]
+    """On the number of frames, and on lines and numbers that cannot be read."""
+
+    @property
+    def joints(self) -> list[Joint]:
+        """The joints in file order."""
+        return self.parsed.joints
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -59,65 +56,81 @@ class BvhFile:
 
 
 def scan_bvh(path: Path) -> BvhFile:
-    """Parse a BVH file without checking its motion.
+    """Read a BVH file as far as it can be read.
 
     Raises:
         InputError: no skeleton, or no motion with the usual header.
     """
-    path = check_readable(path, "a BVH file")
-    text = path.read_bytes().decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    start = _MOTION.search(text)
-    joints = parse_hierarchy(path, text[: start.start()] if start else text[:4_000_000])
-    header = _HEADER.match(text[start.end() :]) if start else None
-    if start is None or header is None:
-        read_bvh(path)  # raises with the fault and its line
-        raise InputError(f"{path}: expected 'Frames:' and 'Frame Time:' after MOTION.")
-    body = text[start.end() + header.end() :]
-    return BvhFile(
-        joints,
-        int(header[2]),
-        header[4],
-        [line for line in body.split("\n") if line.strip()],
-        text[: start.end()] + header[1],
-        header[3] + header[4] + "\n",
-    )
-
-
-def check_frame_count(file: BvhFile) -> list[Finding]:
-    """Number of frames by the header compared with the lines of motion."""
-    count = len(file.rows)
-    if count == file.claimed:
-        return []
-    message = f"the header says {file.claimed} frames and there are {count} lines of motion."
-    fix = f"Write 'Frames: {count}', or copy the file again if it was cut short."
-    return [Finding("warning", "frame-count", message, fix, Place(frame=min(count, file.claimed)), float(count))]
-
-
-def check_rows(file: BvhFile) -> tuple[list[Finding], Float[np.ndarray, "T C"]]:
-    """Findings on lines with wrong numbers, and the values of the lines before the first such one."""
-    count = len(file.channels)
+    parsed = parse_bvh(path, read_text(path))
     findings: list[Finding] = []
-    stop = len(file.rows)
-    lengths = np.array([len(row.split()) for row in file.rows])
+    try:
+        values = values_of(parsed)
+        count = len(values)
+    except InputError as error:
+        if not any(line.strip() for line in parsed.lines):
+            raise
+        findings, values, count = _readable(parsed, error)
+    return BvhFile(parsed, values, count, _check_count(parsed, count) + findings)
+
+
+def _check_count(parsed: Parsed, count: int) -> list[Finding]:
+    """Number of frames by the header compared with that in the file."""
+    if count == parsed.frames:
+        return []
+    message = f"the header says {parsed.frames} frames and there are {count} in the file."
+    remedy = count_remedy(parsed.frames, count, parsed.fps)
+    place = Place(frame=min(count, parsed.frames))
+    return [Finding("warning", "frame-count", message, remedy[:1].upper() + remedy[1:], place, float(count))]
+
+
+def _readable(parsed: Parsed, error: InputError) -> tuple[list[Finding], Float[np.ndarray, "T C"], int]:
+    """Findings on lines with wrong numbers, the values of the lines before the first such one, the number of lines."""
+    rows = [row for line in parsed.lines if (row := line.split())]
+    count = parsed.channels
+    findings: list[Finding] = []
+    stop = len(rows)
+    lengths = np.array([len(row) for row in rows])
     if (wrong := np.flatnonzero(lengths != count)).size:
         stop = int(wrong[0])
         message = (
             f"{len(wrong)} lines of motion do not have {count} numbers, one per channel; this one has {lengths[stop]}."
         )
+        if np.median(lengths) != count:
+            message = str(error).removeprefix(f"{parsed.path}, ")
         findings.append(Finding("warning", "columns", message, "Export the file again.", Place(frame=stop)))
     try:
-        values = np.array([row.split() for row in file.rows[:stop]], np.float64).reshape(stop, count)
+        values = np.array(rows[:stop], np.float64).reshape(stop, count)
     except ValueError:
-        message = "some values of the motion are not numbers."
+        message = f"some values of the motion are not numbers: {str(error).removeprefix(f'{parsed.path}, ')}"
         findings.append(Finding("warning", "numbers", message, "Export the file again."))
-        return findings, np.zeros((0, count))
+        return findings, np.zeros((0, count)), len(rows)
     finite = np.isfinite(values).all(axis=1)
     if not finite.all():
         first = int(np.argmin(finite))
         message = f"{int((~finite).sum())} frames hold NaN or infinite values."
         findings.append(Finding("warning", "nan", message, "Cut them out or fill them.", Place(frame=first)))
         values = values[:first]
-    return findings, values
+    return findings, values, len(rows)
+
+
+def check_layout(layout: Layout) -> list[Finding]:
+    """Findings on the unit, on bones that move, and on a path that another joint than the root has."""
+    findings = []
+    unit = layout.unit
+    if not unit.plain:
+        fix = "" if unit.usual else "If you know it, name it when reading (scale of read_bvh)."
+        findings.append(Finding("info" if unit.usual else "warning", "unit", f"{unit}.", fix, value=unit.metres))
+    if layout.carrier:
+        name = layout.joints[layout.carrier].name
+        message = f"the path of the body is in the position channels of {name}; it is read as that of the root above."
+        findings.append(Finding("info", "path", message, place=Place(joint=name)))
+    if layout.stretch is not None and layout.stretch.metres > STRETCH:
+        place = Place(joint=layout.stretch.joint, frame=layout.stretch.frame)
+        fix = "Export it with rotations only below the hips, if exact places matter."
+        findings.append(
+            Finding("warning", "moving-bones", f"{layout.stretch}.", fix, place, 100 * layout.stretch.metres)
+        )
+    return findings
 
 
 def check_wraps(file: BvhFile, values: Float[np.ndarray, "T C"], motion: Motion) -> list[Finding]:
@@ -135,29 +148,3 @@ def check_wraps(file: BvhFile, values: Float[np.ndarray, "T C"], motion: Motion)
         f"most in {file.channels[rotations[worst]]}; rotations read from them do not."
     )
     return [Finding("info", "euler-wrap", message, value=float(jumps.sum()))]
-
-
-def read_first_frames(path: Path, file: BvhFile, frames: int) -> Motion | None:
-    """The motion of the first ``frames`` lines; None without any.
-
-    Raises:
-        InputError: see :func:`~a2g_jax.io.bvh.read_bvh`; the message names the file itself.
-    """
-    if frames == 0:
-        return None
-    if frames == len(file.rows) == file.claimed:
-        return read_bvh(path)
-    with _repaired(file, frames) as temporary:
-        try:
-            return read_bvh(temporary)
-        except InputError as error:
-            raise InputError(str(error).replace(str(temporary), str(path))) from None
-
-
-@contextmanager
-def _repaired(file: BvhFile, frames: int) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "repaired.bvh"
-        rows = "\n".join(file.rows[:frames])
-        path.write_text(f"{file.head}{frames}{file.middle}{rows}\n", encoding="utf-8")
-        yield path

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import active_level_db
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.match_table import missing_parts
 from a2g_jax.geometry.retarget.poses import joint_places, rotation_angle, world_rotations
 from a2g_jax.geometry.retarget.rig import Rig, find_rig
 from a2g_jax.inspection.audio_checks import clipped_share, peak_db
@@ -21,15 +22,31 @@ _TRACKED = ("L_Wrist", "R_Wrist", "Head")
 def try_rig(motion: Motion, path: str) -> tuple[Rig | None, list[Finding]]:
     """The body of a motion, or a note that none is found."""
     try:
-        return find_rig(motion, name=path), []
+        rig = find_rig(motion, name=path)
     except InputError as error:
-        message = f"no body is found in the skeleton ({error})"
+        text = str(error).removeprefix(f"{path}: ")
+        message = text if text.startswith("no human body") else f"no human body is found in the skeleton ({text})"
         fix = "Facts that need a body (speeds of the hands, the offset) are left out; retargeting is not possible."
         return None, [Finding("info", "no-body", " ".join(message.split()), fix)]
+    fix = "Name these joints in the usual way; retargeting does not move what it does not find."
+    return rig, [Finding("warning", "unmapped", f"{text}.", fix) for text in missing_parts(rig)]
 
 
-def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
-    """Length, frame rate, rotation ranges of joints, speed and reach of hands and head."""
+def body_places(motion: Motion, rig: Rig) -> Float[np.ndarray, "T J 3"]:
+    """Positions of the joints in metres: left, up, forward of the rig's world."""
+    world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
+    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
+    return (positions + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+
+
+def motion_facts(
+    motion: Motion, rig: Rig | None, positions: Float[np.ndarray, "T J 3"] | None = None
+) -> dict[str, Any]:
+    """Length, frame rate, rotation ranges of joints, speed and reach of hands and head.
+
+    Args:
+        positions: of the joints (:func:`body_places`), if computed before.
+    """
     facts: dict[str, Any] = {
         "frames": motion.frames,
         "fps": round(motion.fps, 6),
@@ -47,9 +64,7 @@ def motion_facts(motion: Motion, rig: Rig | None) -> dict[str, Any]:
         }
     if rig is None or motion.frames < 2:
         return facts
-    world = world_rotations(np.asarray(motion.rotations, np.float32), motion.skeleton.parents)
-    positions = joint_places(world, np.asarray(motion.skeleton.offsets), motion.skeleton.parents)
-    positions = (positions + np.asarray(motion.root)[:, None]) * rig.unit_factor @ rig.world
+    positions = body_places(motion, rig) if positions is None else positions
     chest = positions[:, rig.roles["Chest"]]
     for part in _TRACKED:
         if part in rig.roles:

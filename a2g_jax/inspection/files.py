@@ -12,10 +12,11 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.audio_checks import check_sound, finding_of
-from a2g_jax.inspection.bvh_file import check_frame_count, check_rows, check_wraps, read_first_frames, scan_bvh
-from a2g_jax.inspection.describe import audio_facts, motion_facts, try_rig, word_facts
-from a2g_jax.inspection.finding import Finding, Place, located
-from a2g_jax.inspection.motion_checks import check_finite, check_motion
+from a2g_jax.inspection.bvh_file import check_layout, check_wraps, scan_bvh
+from a2g_jax.inspection.describe import audio_facts, body_places, motion_facts, try_rig, word_facts
+from a2g_jax.inspection.finding import Finding, Place, later, located
+from a2g_jax.inspection.motion_checks import check_calibration, check_finite, check_motion
+from a2g_jax.inspection.shaking import check_shaking
 from a2g_jax.inspection.sync import (
     Offset,
     at_rate,
@@ -27,6 +28,7 @@ from a2g_jax.inspection.sync import (
 )
 from a2g_jax.inspection.tree import skeleton_facts
 from a2g_jax.io.audio import load_audio
+from a2g_jax.io.bvh_reader import build
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.io.reading import current_reading
 from a2g_jax.io.sound_file import AUDIO_SUFFIXES, FFMPEG_SUFFIXES
@@ -79,22 +81,21 @@ def inspect_file(path: Path) -> Inspected:
 def inspect_bvh(path: Path) -> Inspected:
     """Inspect a BVH file; faults of the header become warnings, and the readable frames are inspected."""
     file = scan_bvh(path)
-    findings = check_frame_count(file)
-    faults, values = check_rows(file)
-    findings += faults
-    motion = read_first_frames(path, file, len(values))
+    findings = list(file.findings)
     facts: dict[str, Any] = {
         "file": {
-            "frames by the header": file.claimed,
-            "frame time (s)": file.frame_time,
+            "frames by the header": file.parsed.frames,
+            "frame time (s)": file.parsed.frame_time,
             "channels": len(file.channels),
             "root channels": " ".join(file.root_order),
             "rotation orders": list(file.orders),
         }
     }
-    if motion is None:
+    if len(file.values) == 0:
         return Inspected(str(path), "bvh", facts, located(findings, path=str(path)))
-    findings += check_wraps(file, values, motion)
+    motion, layout = build(file.parsed, file.values)
+    facts["file"]["unit"] = str(layout.unit)
+    findings += check_layout(layout) + check_wraps(file, file.values, motion)
     inspected = _with_motion(path, "bvh", motion, facts)
     inspected.findings = located(findings, path=str(path)) + inspected.findings
     return inspected
@@ -102,8 +103,16 @@ def inspect_bvh(path: Path) -> Inspected:
 
 def _with_motion(path: Path, kind: str, motion: Motion, facts: dict[str, Any]) -> Inspected:
     rig, findings = try_rig(motion, str(path))
-    findings += check_motion(motion, rig)
-    facts |= {"motion": motion_facts(motion, rig), "skeleton": skeleton_facts(motion.skeleton, rig)}
+    calibration, start = check_calibration(motion)
+    places = None if rig is None else body_places(motion, rig)
+    findings += calibration
+    # What is not part of the take has faults of its own.
+    taken = motion.clip(start, motion.frames) if start else motion
+    faults = check_motion(taken, rig)
+    if not any(finding.code == "nan" for finding in faults):
+        faults += check_shaking(taken, rig, None if places is None else places[start:])
+    findings += later(faults, start, motion.fps)
+    facts |= {"motion": motion_facts(motion, rig, places), "skeleton": skeleton_facts(motion.skeleton, rig)}
     return Inspected(str(path), kind, facts, located(findings, path=str(path)), motion, rig)
 
 

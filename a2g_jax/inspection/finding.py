@@ -64,6 +64,19 @@ def located(findings: Iterable[Finding], *, path: str = "", recording: str = "")
     ]
 
 
+def later(findings: Iterable[Finding], frames: int, fps: float) -> list[Finding]:
+    """The findings of a motion that starts ``frames`` frames later in its file."""
+    if frames == 0:
+        return list(findings)
+
+    def moved(place: Place) -> Place:
+        frame = None if place.frame is None else place.frame + frames
+        seconds = None if place.seconds is None else place.seconds + frames / fps
+        return replace(place, frame=frame, seconds=seconds)
+
+    return [replace(finding, place=moved(finding.place)) for finding in findings]
+
+
 def warnings_of(findings: Iterable[Finding]) -> list[Finding]:
     """The warnings among findings."""
     return [finding for finding in findings if finding.severity == "warning"]

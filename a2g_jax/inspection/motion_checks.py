@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.calibration import calibration_frames
 from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.inspection.finding import Finding, Place
@@ -143,6 +144,20 @@ def check_jumps(motion: Motion) -> list[Finding]:
     return [
         Finding("warning", "jump", message, "Is it two takes in one file? Split it.", place, float(steps[worst, 0]))
     ]
+
+
+def check_calibration(motion: Motion) -> tuple[list[Finding], int]:
+    """A finding on a calibration pose at the start, and the frame at which the take itself starts."""
+    if not (np.isfinite(motion.rotations).all() and np.isfinite(motion.root).all()):
+        return [], 0
+    count = calibration_frames(motion)
+    if count == 0:
+        return [], 0
+    which = "frame 0 is" if count == 1 else f"frames 0 to {count - 1} are"
+    turn = float(rotation_steps(motion.clip(count - 1, count + 1)).max())
+    message = f"{which} a calibration pose (such as a T-pose); then joints turn by {turn:.0f} degrees at once."
+    fix = "'a2g prepare' leaves it out; leave it out of clips to pin or to take a style from."
+    return [Finding("warning", "calibration", message, fix, Place(frame=0, seconds=0.0), float(count))], count
 
 
 def check_repeats(motion: Motion) -> list[Finding]:

@@ -32,6 +32,9 @@ USUAL, TOLERATED = -0.03, 0.2
 LONGEST, SHORTEST = 10.0, 20.0
 #: Tolerance of lengths in seconds and as a share: recorders stop at different times.
 SPARE_SECONDS, SPARE_SHARE = 0.5, 0.01
+#: Share and seconds within which a usual rate is taken in place of the measured one; a longer gap is that of recorders
+#: that stop at different times.
+RATE_SURE, RATE_SECONDS = 0.005, 0.25
 #: A wrong frame rate explains a difference in length if the rest is below this share, or below this number of frames.
 RATE_FITS, FRAMES_FIT = 0.02, 1.5
 _RATES = (15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
@@ -73,7 +76,9 @@ def check_lengths(frames: int, fps: float, audio_seconds: float) -> list[Finding
     lengths = f"the motion lasts {seconds:.2f} s and the audio {audio_seconds:.2f} s"
     if rate is not None:
         message = f"{lengths}: at {rate:.6g} instead of {fps:.6g} fps the motion would last {frames / rate:.2f} s."
-        return [Finding("warning", "frame-time", message, f"Set 'Frame Time: {1 / rate:.8f}'.", value=rate)]
+        exact = abs(frames / rate - audio_seconds) < 1e-9 and rate not in (*_RATES, *_BROADCAST)
+        measured = " (measured: the rate at which both are equally long)" if exact else ""
+        return [Finding("warning", "frame-time", message, f"Set 'Frame Time: {1 / rate:.8f}'{measured}.", value=rate)]
     return [Finding("warning", "length", f"{lengths}.", "Are they of the same take? Cut both to it.", value=gap)]
 
 
@@ -87,7 +92,11 @@ def _fitting_rate(frames: int, fps: float, audio_seconds: float) -> float | None
     if gap(best) * fps > FRAMES_FIT:
         best = whole
     fits = gap(best) <= RATE_FITS * audio_seconds or gap(best) * fps <= FRAMES_FIT
-    return best if fits and gap(best) < gap(fps) / 2 else None
+    if not fits or gap(best) >= gap(fps) / 2:
+        return None
+    within = max(FRAMES_FIT / best, RATE_SURE * audio_seconds)
+    # Too far for the usual rate, too near for recorders that stop at different times: a rate of its own.
+    return frames / audio_seconds if within < gap(best) < RATE_SECONDS else best
 
 
 def check_offset(offset: Offset | None) -> list[Finding]:

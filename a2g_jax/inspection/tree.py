@@ -8,6 +8,9 @@ from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.retarget.rig import Rig
 from a2g_jax.geometry.skeleton import Skeleton
 
+#: Hands with more joints below the wrist are one line.
+_FOLD = 3
+
 
 def skeleton_facts(skeleton: Skeleton, rig: Rig | None = None) -> dict[str, Any]:
     """Joints with parents, bone lengths in centimetres and the parts of a body."""
@@ -44,7 +47,7 @@ def body_facts(body: Skeleton | PoseLayout, rig: Rig | None = None) -> dict[str,
 
 
 def draw_tree(facts: dict[str, Any]) -> list[str]:
-    """One line per joint: branch, name, bone length, part of the body."""
+    """One line per joint: branch, name, bone length, part of the body; the joints below a hand share a line."""
     joints = facts["joints"]
     children: dict[int, list[int]] = {}
     for joint, entry in enumerate(joints):
@@ -57,8 +60,16 @@ def draw_tree(facts: dict[str, Any]) -> list[str]:
         length = f"{entry['bone_cm']:.1f} cm" if joint else ""
         rows.append((before + branch + entry["name"], length, entry["part"]))
         below = children.get(joint, [])
+        if entry["part"] in ("L_Wrist", "R_Wrist") and (count := _count(children, joint)) > _FOLD:
+            rows.append((f"{indent}└─ {count} joints of the hand", "", ""))
+            continue
         for number, child in reversed(list(enumerate(below))):
             last = number == len(below) - 1
             stack.append((child, indent, "└─ " if last else "├─ ", indent + ("   " if last else "│  ")))
     width, numbers = max(len(row[0]) for row in rows), max(len(row[1]) for row in rows)
     return [f"{name.ljust(width)}  {length.rjust(numbers)}  {part}".rstrip() for name, length, part in rows]
+
+
+def _count(children: dict[int, list[int]], joint: int) -> int:
+    """Number of joints below one."""
+    return sum(1 + _count(children, child) for child in children.get(joint, []))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NoReturn
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.anthropometry import Unit
 
 #: Bounds on what is read and written: a broken or hostile file costs an error message, not memory.
 MAX_DEPTH = 512
@@ -16,6 +17,7 @@ MAX_VALUE = 1e9
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 _CHANNEL = {name.lower(): name for name in CHANNELS}
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?(?:[0-9]*|[0-9]{1,3}(?:\.[0-9]{3})+),[0-9]+(?:[eE][+-]?[0-9]+)?")
 _TOKEN = re.compile(r"[{}]|[^\s{}]+|\n")
 _STATEMENTS = "OFFSET, CHANNELS, JOINT, End Site or '}'"
 
@@ -32,6 +34,30 @@ class Joint:
     ends: list[tuple[float, float, float]] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """Bones that move, read as bones of fixed length."""
+
+    joint: str
+    """The joint that is farthest from its place in the file."""
+    frame: int
+    metres: float
+    moving: int
+    """Number of joints whose position channels move."""
+
+    def __str__(self) -> str:
+        """The warning."""
+        what = (
+            "the position channels of one joint move"
+            if self.moving == 1
+            else (f"the position channels of {self.moving} joints move")
+        )
+        return (
+            f"{what} against the joint above; bones have a fixed length here, so joints are up to "
+            f"{100 * self.metres:.1f} cm from their places in the file ({self.joint}, frame {self.frame})"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Layout:
     """Layout of a BVH file: what a writer needs to write another motion in the same way."""
@@ -41,6 +67,14 @@ class Layout:
     joints: list[Joint]
     scale: float
     """Metres in one unit of the file."""
+    unit: Unit
+    """How that was found."""
+    carrier: int = 0
+    """The joint whose position channels hold the path of the body."""
+    still_root: tuple[float, float, float] | None = None
+    """Position of a root that does not move, metres; None if it moves."""
+    stretch: Stretch | None = None
+    """The largest error of a joint's place that bones of fixed length cause, if bones move."""
 
 
 def fail(path: object, line: int, message: str) -> NoReturn:
@@ -56,6 +90,17 @@ def shown(token: str) -> str:
 def parse_number(token: str) -> float | None:
     """The number written as ``token`` in plain ASCII, or None, also for Python's own forms (``1_000``, ``nan``)."""
     return float(token) if _NUMBER.fullmatch(token) else None
+
+
+def comma_hint(token: str) -> str:
+    """The remedy for a number written with a decimal comma, or with commas or semicolons around it; else empty."""
+    if ";" in token:
+        return " (semicolons separate the values: write spaces instead)"
+    if "," not in token:
+        return ""
+    if _DECIMAL_COMMA.fullmatch(token):
+        return " (a decimal comma: write a point in all numbers, or export the file with an English number format)"
+    return " (commas separate the values: write spaces instead)"
 
 
 def parse_hierarchy(path: object, text: str) -> list[Joint]:
@@ -191,7 +236,7 @@ class _Parser:
             token = self.next()
             value = parse_number(token)
             if value is None:
-                self.fail(f"expected three numbers as the OFFSET of {owner}; got {shown(token)}.")
+                self.fail(f"expected three numbers as the OFFSET of {owner}; got {shown(token)}{comma_hint(token)}.")
             if abs(value) > MAX_VALUE:
                 self.fail(f"the OFFSET of {owner} is out of range; got {shown(token)}.")
             values.append(value)
@@ -200,7 +245,10 @@ class _Parser:
     def channels(self, joint: Joint) -> tuple[str, ...]:
         token = self.next()
         if token not in ("0", "1", "2", "3", "4", "5", "6"):
-            self.fail(f"expected a number of channels from 0 to 6 in joint {shown(joint.name)}; got {shown(token)}.")
+            self.fail(
+                f"expected a number of channels from 0 to 6 in joint {shown(joint.name)}; got {shown(token)}"
+                f"{comma_hint(token)}."
+            )
         count = int(token)
         found: list[str] = []
         for _ in range(count):
@@ -209,7 +257,7 @@ class _Parser:
             if channel is None:
                 self.fail(
                     f"expected {count} channel names in joint {shown(joint.name)}; got {shown(token)}, "
-                    f"which is none of {', '.join(CHANNELS)}."
+                    f"which is none of {', '.join(CHANNELS)}{comma_hint(token)}."
                 )
             if channel in found:
                 self.fail(f"channel {channel} occurs twice in joint {shown(joint.name)}; remove one.")

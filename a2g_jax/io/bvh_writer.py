@@ -73,7 +73,7 @@ def write_like(path: str | os.PathLike[str], motion: Motion, layout: Layout) -> 
     """
     rotations, root = _checked(path, motion)
     offsets = np.asarray(motion.skeleton.offsets, np.float64) / layout.scale
-    root = root / layout.scale
+    places = _places(motion.skeleton.parents, rotations, root / layout.scale, offsets, layout)
     columns: list[Float[np.ndarray, " T"]] = []
     errors: dict[str, float] = {}
     for index, joint in enumerate(layout.joints):
@@ -87,9 +87,41 @@ def write_like(path: str | os.PathLike[str], motion: Motion, layout: Layout) -> 
             if channel.endswith("rotation"):
                 columns.append(angles[:, order.index(channel[0])])
             else:
-                columns.append(root[:, axis] if index == 0 else np.full(motion.frames, offsets[index, axis]))
+                own = places.get(index)
+                columns.append(np.full(motion.frames, offsets[index, axis]) if own is None else own[:, axis])
     _write(path, layout.head.rstrip(), np.stack(columns, axis=1), [_ANGLE_DECIMALS] * len(columns), motion.fps)
     return errors
+
+
+def _places(
+    parents: tuple[int, ...],
+    rotations: Float[np.ndarray, "T J 3 3"],
+    root: Float[np.ndarray, "T 3"],
+    offsets: Float[np.ndarray, "J 3"],
+    layout: Layout,
+) -> dict[int, Float[np.ndarray, "T 3"]]:
+    """What goes into position channels that hold no bone: those of the root and of the joint that carries the path.
+
+    Where the root stands still in the layout's own motion, or lacks channels, the carrier takes the rest of the path.
+    """
+    carrier = layout.carrier
+    if carrier == 0:
+        return {0: root}
+    written = root if layout.still_root is None else np.tile(np.array(layout.still_root) / layout.scale, (len(root), 1))
+    own = layout.joints[0]
+    for axis, letter in enumerate("XYZ"):
+        if f"{letter}position" not in (own.channels or ()):
+            written = written.copy()
+            written[:, axis] = (own.offset or (0.0, 0.0, 0.0))[axis]
+    chain = [carrier]
+    while parents[chain[0]] >= 0:
+        chain.insert(0, parents[chain[0]])
+    above = rotations[:, 0]
+    for joint in chain[1:-1]:
+        above = above @ rotations[:, joint]
+    # The path that the root does not take, turned into the frame of the joint above the carrier.
+    rest = (np.swapaxes(above, -1, -2) @ (root - written)[:, :, None])[..., 0]
+    return {0: written, carrier: offsets[carrier] + rest}
 
 
 def _angles(rotations: Float[np.ndarray, "T 3 3"], order: str) -> tuple[Float[np.ndarray, "T A"], float]:

@@ -35,6 +35,12 @@ def rate_from_frame_time(printed: str) -> float:
     return rate
 
 
+def usual_rate(rate: float, within: float) -> float | None:
+    """The usual rate that is nearest to a measured one, if it differs by no more than a share; otherwise None."""
+    nearest = min(_USUAL, key=lambda usual: abs(usual - rate))
+    return float(nearest) if abs(nearest - rate) <= within * nearest else None
+
+
 def _precision(printed: str) -> tuple[int, int]:
     # Significant digits, and digits after the decimal point.
     mantissa, _, exponent = printed.lower().partition("e")

@@ -238,7 +238,7 @@ def test_what_is_missing_is_named():
     motion, joints = Spec(dialect="beat").build(POSES)
     names = tuple(name.replace("LeftArm", "Thing") for name in motion.skeleton.names)
     chain = Skeleton(np.ones((3, 3), np.float32), ("a", "b", "c"), (-1, 0, 1))
-    with pytest.raises(InputError, match="walk.bvh: no L_Shoulder"):
+    with pytest.raises(InputError, match="walk.bvh: no human body: no L_Shoulder"):
         find_rig(chain, name="walk.bvh")
     # One name missing: the part is found by the shape of the tree.
     renamed = dataclasses.replace(motion.skeleton, names=names)

@@ -4,39 +4,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import path_up
 from a2g_jax.geometry.joint_names import parse_name
-from a2g_jax.geometry.retarget.poses import angle_between, joint_places
+from a2g_jax.geometry.retarget.match_table import body_frame_of, body_places, missing_parts, table
+from a2g_jax.geometry.retarget.pairs import Pair, Share
 from a2g_jax.geometry.retarget.rest import ankle_height
 from a2g_jax.geometry.retarget.rig import Rig
 
 #: Rigid segments: a joint between their two ends is a twist bone, which twists but does not bend.
 _RIGID = {"Shoulder": "Elbow", "Elbow": "Wrist", "Hip": "Knee", "Knee": "Ankle"}
 _NEXT = {**_RIGID, "Collar": "Shoulder", "Ankle": "Foot", "Wrist": "Middle1"}
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A joint of the target and the joint of the source whose pose it copies."""
-
-    target: int
-    source: int
-    role: str
-    how: str
-    """``"name"``, ``"shape"`` (topology), ``"order"`` (spines and necks) or ``"same name"``."""
-
-
-@dataclass(frozen=True)
-class Share:
-    """A joint of the target between two matched ones, posed by interpolation between their poses."""
-
-    target: int
-    above: int
-    below: int
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +32,20 @@ class Match:
     """Metres by which the target's hips are raised after scaling, so that its soles are where the source's are."""
 
     def table(self) -> str:
-        """Text with a line for each target joint: source joints, how matched, angle at rest, ratio of bone lengths."""
-        rows = [("source", "target", "part", "found by", "rest angle", "length")]
-        matched_sources = {pair.source for pair in self.pairs}
+        """Text with a line for each target joint and one for the fingers of a hand: how they were matched."""
+        return table(self.source, self.target, self.pairs, self.shares, self.scale, self.lift, self.bones())
+
+    def warnings(self) -> list[str]:
+        """Head, neck or hands that are not moved, a sentence each."""
+        found = [f"the {what}: {text}" for what, rig in (("source", self.source), ("target", self.target))
+                 for text in missing_parts(rig)]  # fmt: skip
         matched = {pair.target for pair in self.pairs}
-        for pair in sorted(self.pairs, key=lambda pair: pair.target):
-            composed = _composed(self.source.skeleton.parents, pair.source, matched_sources)
-            names = "+".join(self.source.skeleton.names[joint] for joint in composed)
-            angle, ratio = self._bone(pair)
-            rows.append((names, self.target.skeleton.names[pair.target], pair.role, pair.how, angle, ratio))
-        shared = {share.target: share for share in self.shares}
-        for joint, name in enumerate(self.target.skeleton.names):
-            if joint in shared:
-                rows.append(("-", name, "", f"share {shared[joint].weight:.2f}", "", ""))
-            elif joint not in matched:
-                rows.append(("-", name, "", "at rest", "", ""))
-        widths = [max(len(row[column]) for row in rows) for column in range(6)]
-        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        for what, rig in (("source", self.source), ("target", self.target)):
-            lines.append(f"{what}: {'parts by shape; ' if rig.by_shape else ''}{'; '.join(rig.notes)}")
-        lines.append(f"lengths times {self.scale:.3f}, hips raised by {100 * self.lift:.1f} cm")
-        return "\n".join(lines)
+        for role, label in (("Head", "head"), ("L_Wrist", "left hand"), ("R_Wrist", "right hand")):
+            joint = self.target.roles.get(role)
+            if joint is not None and joint not in matched and self.source.neck + self.source.spine:
+                name = self.target.skeleton.names[joint]
+                found.append(f"the target's {label} ({name}) has no match and stays at rest")
+        return found
 
     def bones(self) -> list[tuple[str, tuple[int, int], tuple[int, int]]]:
         """Bones that both rigs have: the part, then (joint, joint below) in the source and in the target."""
@@ -88,18 +60,6 @@ class Match:
                 start = self.source.roles.get(role, pair.source), self.target.roles.get(role, pair.target)
                 found.append((role, (start[0], ends.source), (start[1], ends.target)))
         return found
-
-    def _bone(self, pair: Pair) -> tuple[str, str]:
-        for role, (s0, s1), (t0, t1) in self.bones():
-            if role == pair.role:
-                first = _body_places(self.source)
-                second = _body_places(self.target)
-                source, target = first[s1] - first[s0], second[t1] - second[t0]
-                if np.linalg.norm(source) < 1e-6 or np.linalg.norm(target) < 1e-6:
-                    return "", ""
-                ratio = np.linalg.norm(target) / np.linalg.norm(source)
-                return f"{angle_between(source, target):.1f}", f"{ratio:.2f}"
-        return "", ""
 
 
 def match_rigs(source: Rig, target: Rig) -> Match:
@@ -191,14 +151,6 @@ def _matched_above(parents: tuple[int, ...], joint: int, matched: set[int]) -> i
     return joint if joint >= 0 else None
 
 
-def _composed(parents: tuple[int, ...], joint: int, matched: set[int]) -> list[int]:
-    """The joint and the unmatched ones above it, whose rotations it includes, from above."""
-    joints = [joint]
-    while parents[joints[0]] >= 0 and parents[joints[0]] not in matched:
-        joints.insert(0, parents[joints[0]])
-    return joints
-
-
 def _shares(chain: list[int], matched: set[int]) -> list[Share]:
     shares = []
     anchors = [at for at, joint in enumerate(chain) if joint in matched]
@@ -215,7 +167,7 @@ def _scale(source: Rig, target: Rig) -> tuple[float, float]:
     parts = parts if legs else ("Shoulder", "Elbow", "Wrist")
     lengths = []
     for rig in rigs:
-        places = _body_places(rig)
+        places = body_places(rig)
         joints = [[rig.roles[f"{side}_{part}"] for part in parts] for side in "LR"]
         bones = [(a, b) for row in joints for a, b in zip(row, row[1:], strict=False)]
         lengths.append(sum(np.linalg.norm(places[b] - places[a]) for a, b in bones))
@@ -224,17 +176,7 @@ def _scale(source: Rig, target: Rig) -> tuple[float, float]:
     scale = float(lengths[1] / lengths[0])
     if not legs:
         return scale, 0.0
-    heights = [ankle_height(rig.skeleton, _body_places(rig), _body(rig).T @ rig.rest_world, rig.roles) for rig in rigs]
+    heights = [
+        ankle_height(rig.skeleton, body_places(rig), body_frame_of(rig).T @ rig.rest_world, rig.roles) for rig in rigs
+    ]
     return scale, heights[1] - scale * heights[0]
-
-
-def _body(rig: Rig) -> Float[np.ndarray, "3 3"]:
-    """``R_rest_body``, which is the anatomical frame of any joint of the trunk at rest."""
-    chest = rig.roles["Chest"]
-    return rig.rest_world[chest] @ rig.align[chest]
-
-
-def _body_places(rig: Rig) -> Float[np.ndarray, "J 3"]:
-    """Positions in the reference pose, in the body frame."""
-    offsets = np.asarray(rig.skeleton.offsets, np.float64)
-    return joint_places(rig.rest_world, offsets, rig.skeleton.parents) @ _body(rig)

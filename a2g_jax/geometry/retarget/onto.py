@@ -15,17 +15,18 @@ from a2g_jax.geometry.skeleton import Skeleton
 _SAME_REST = 1.0
 
 
-def on_skeleton(motion: Motion, skeleton: Skeleton, fps: float, name: str) -> Motion:
+def on_skeleton(motion: Motion, skeleton: Skeleton, fps: float, name: str, whole: Motion | None = None) -> Motion:
     """The rotations of a humanoid motion on another skeleton, at another rate.
 
     Args:
         name: of the motion, for messages.
+        whole: the take that the motion is a part of, which may show the rig's reference pose; itself by default.
 
     Raises:
         InputError: a rig that is not recognised.
     """
     if not same_rest(motion.skeleton, skeleton):
-        source = find_rig(motion, name=name)
+        source = find_rig(motion if whole is None else whole, name=name)
         motion = retarget(motion, match_rigs(source, find_rig(skeleton, name="the run's skeleton")))
     # Bones of other lengths on the same joints need no retargeting: poses are rotations alone.
     return resample(replace(motion, skeleton=skeleton), fps)

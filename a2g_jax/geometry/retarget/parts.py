@@ -10,6 +10,7 @@ from a2g_jax.geometry.body_joints import path_up
 from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.retarget.rest import trunk_axis
 from a2g_jax.geometry.retarget.topology import joints_by_shape
+from a2g_jax.geometry.retarget.upper import neck_and_head
 from a2g_jax.geometry.skeleton import Skeleton
 
 #: Parts without which there is nothing to retarget.
@@ -40,14 +41,18 @@ def find_parts(
         fixed[role] = skeleton.index(joint)
     taken = set(fixed.values())
     roles = {role: joint for role, joint in named_joints(skeleton.names).items() if joint not in taken} | fixed
+    if "L_Shoulder" in roles and "R_Shoulder" in roles:
+        roles = neck_and_head(skeleton, roles) | roles
     unsided = None
     if missing := [role for role in _NEEDED if role not in roles]:
         shape = joints_by_shape(skeleton)
-        if shape is None:
+        named = [role for role in _NEEDED if role in roles and not role.endswith("Wrist")]
+        # Two fingers, brows or legs of a table are a pair of branches, too.
+        if shape is None or not (named or "L_Hip" in shape):
             raise InputError(
-                f"{name}: no {', no '.join(missing)} found, neither by names nor by the shape of the tree; name the "
-                f"joints in the usual way or give them by hand. It has {', '.join(skeleton.names[:30])}"
-                f"{' ...' if skeleton.joints > 30 else ''}."
+                f"{name}: no human body: no {', no '.join(missing)} found, neither by names nor by the shape of the "
+                f"tree; name the joints in the usual way or give them by hand. It has "
+                f"{', '.join(skeleton.names[:30])}{' ...' if skeleton.joints > 30 else ''}."
             )
         roles, unsided = _with_names(shape, roles)
     _complete(skeleton, roles)
@@ -160,7 +165,9 @@ def assign_sides(
     """
     feet = [s for s in "LR" if f"{s}_Foot" in roles and f"{s}_Ankle" in roles]
     if not feet:
-        raise InputError(f"{name}: neither joint names nor toes show which side is left; give the joints by hand.")
+        raise InputError(
+            f"{name}: no human body, or one whose left side neither joint names nor toes show; give the joints by hand."
+        )
     forward = sum((places[roles[f"{s}_Foot"]] - places[roles[f"{s}_Ankle"]] for s in feet), np.zeros(3))
     left = np.cross(trunk_axis(places, roles), forward)
     for parts in unsided:

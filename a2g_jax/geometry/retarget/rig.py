@@ -7,7 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.anthropometry import stature
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.human import check_human
 from a2g_jax.geometry.retarget.parts import assign_sides, find_parts, trunk_chains
 from a2g_jax.geometry.retarget.poses import angle_between, frame_of, joint_places, world_rotations
 from a2g_jax.geometry.retarget.rest import anatomy, body_frame, oddness, snapped, trunk_axis
@@ -17,7 +19,10 @@ from a2g_jax.geometry.skeleton import Skeleton
 _GOOD_POSE, _ZERO_POSE, _WORST_POSE = 15.0, 40.0, 75.0
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 #: Units, and the factor that corrects lengths that were read as metres or centimetres.
-_UNITS = (("metres", 1.0), ("inches", 2.54), ("millimetres", 0.1), ("feet", 0.3048), ("decimetres", 10.0))
+_UNITS = (
+    ("metres", 1.0), ("inches", 2.54), ("units of 5.644 cm", 2.54 / 0.45), ("millimetres", 0.1), ("feet", 0.3048),
+    ("decimetres", 10.0),
+)  # fmt: skip
 _ADULT = (1.2, 2.3)
 #: An adult's height over the length of the arm without the hand (Drillis and Contini 1966: 0.186 + 0.146 of height).
 _ARMS_IN_HEIGHT = 3.0
@@ -55,8 +60,8 @@ class Rig:
 
     @property
     def unit_factor(self) -> float:
-        """Factor from the unit as read to metres: 1 unless the file has an unusual unit."""
-        return _guess_unit(self.height)[1]
+        """Factor from the unit as read to metres: 1 unless lengths were read in another unit."""
+        return _guess_unit(self.height, stature(self.skeleton, self.roles))[1]
 
     @property
     def rest_world(self) -> Float[np.ndarray, "J 3 3"]:
@@ -92,6 +97,9 @@ def find_rig(
     motion = None if isinstance(source, Skeleton) else source
     roles, unsided = find_parts(skeleton, name, joints or {})
     by_shape = unsided is not None
+    some = _some_places(motion)
+    if some is not None:
+        check_human(skeleton, roles, some, name)
     local, notes = _reference_pose(skeleton, motion, roles, rest, name)
     world = world_rotations(local, skeleton.parents)
     places = joint_places(world, np.asarray(skeleton.offsets, np.float64), skeleton.parents)
@@ -99,14 +107,14 @@ def find_rig(
         roles = assign_sides(roles, unsided, places, name)
     body = body_frame(places, roles)
     body = _upright(body, drawn="zero pose" in notes[0])
-    axes = _world_axes(motion, roles, body, up, name)
+    axes = _world_axes(some, roles, body, up, name)
     spine, neck = trunk_chains(skeleton, roles)
     heights = places @ body[:, 1]
     height = float(heights.max() - heights.min())
     if "L_Ankle" not in roles or "R_Ankle" not in roles:
         height = _ARMS_IN_HEIGHT * _arm_length(places, roles)
     notes += (f"up is {_axis_name(axes[:, 1])}, forward {_axis_name(axes[:, 2])}",)
-    unit, factor = _guess_unit(height)
+    unit, factor = _guess_unit(height, stature(skeleton, roles))
     notes += (f"{height:.2f} tall: lengths are {'right in metres' if factor == 1 else f'{unit}, times {factor}'}",)
     align = anatomy(skeleton, places, world, body, roles)
     return Rig(skeleton, roles, spine, neck, by_shape, local, align, axes, height, notes)
@@ -163,15 +171,25 @@ def _upright(body: Float[np.ndarray, "3 3"], drawn: bool) -> Float[np.ndarray, "
     return np.stack([frame[:, 1], frame[:, 0], np.cross(frame[:, 1], frame[:, 0])], axis=1)
 
 
+def _some_places(motion: Motion | None) -> Float[np.ndarray, "N J 3"] | None:
+    """Joint positions in up to 200 frames, the root at the origin; None without a motion."""
+    if motion is None or motion.frames == 0:
+        return None
+    rows = np.unique(np.linspace(0, motion.frames - 1, 200).astype(int))
+    return _places(motion.skeleton, np.asarray(motion.rotations)[rows].astype(np.float64))
+
+
 def _world_axes(
-    motion: Motion | None, roles: dict[str, int], body: Float[np.ndarray, "3 3"], up: str | None, name: str
+    some: Float[np.ndarray, "N J 3"] | None,
+    roles: dict[str, int],
+    body: Float[np.ndarray, "3 3"],
+    up: str | None,
+    name: str,
 ) -> Float[np.ndarray, "3 3"]:
     """Left, up and forward in the world of the motion; forward as in the reference pose where that is upright in it."""
     vertical = body[:, 1]
-    if motion is not None and motion.frames and up is None:
-        rows = np.unique(np.linspace(0, motion.frames - 1, 200).astype(int))
-        rotations = np.asarray(motion.rotations)[rows].astype(np.float64)
-        vertical = trunk_axis(_places(motion.skeleton, rotations), roles).mean(axis=0)
+    if some is not None and up is None:
+        vertical = trunk_axis(some, roles).mean(axis=0)
     axis = int(np.argmax(np.abs(vertical)))
     upward = np.eye(3)[axis] * (1.0 if vertical[axis] > 0 else -1.0)
     if up is not None:
@@ -197,9 +215,10 @@ def _arm_length(places: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> floa
     return float(np.linalg.norm(bones, axis=-1).sum() / 2)
 
 
-def _guess_unit(height: float) -> tuple[str, float]:
-    # The reader assumes metres or centimetres; a height that is no adult's means another unit.
-    if _ADULT[0] <= height <= _ADULT[1] or height <= 0:
+def _guess_unit(height: float, limbs: float | None) -> tuple[str, float]:
+    # Lengths of files are in metres by now; those given otherwise may not be. A person of unusual proportions or in a
+    # bent reference pose has either the height or the limbs of a person.
+    if height <= 0 or any(_ADULT[0] <= tall <= _ADULT[1] for tall in (height, limbs or height)):
         return _UNITS[0]
     return min(_UNITS, key=lambda unit: abs(np.log(height * unit[1] / 1.7)))
 

@@ -11,6 +11,8 @@ from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 #: Default positions of parts that a rig lacks: the collar as a share of the way from chest to shoulder, the ball of the
 #: foot from the ankle and the head from the neck as shares of the length of a leg and of the trunk.
 _COLLAR, _BALL, _HEAD = 0.3, (0.0, -0.08, 0.17), (0.0, 0.2, 0.03)
+#: Metres from the ball of a foot to the end site of one that has none.
+_TOE = 0.05
 _METACARPALS = ("Ring", "Pinky", "Index")
 _CARRIERS = {"Pinky": "Ring", "Thumb": "Index"}
 
@@ -58,7 +60,12 @@ def body_skeleton(rig: Rig) -> Skeleton:
         if role in rig.roles and (tip := person.tip(rig.roles[role])) is not None:
             ends.append((BODY_JOINTS.index(role), tip))
     factor = rig.unit_factor
-    return Skeleton((offsets * factor).astype(np.float32), BODY_JOINTS, BODY_PARENTS, _scaled(ends, factor))
+    ends = list(_scaled(ends, factor))
+    for foot in (BODY_JOINTS.index("L_Foot"), BODY_JOINTS.index("R_Foot")):
+        if foot not in [joint for joint, _ in ends]:
+            # Level, so that it does not lower the sole: a writer would add one along the bone from the ankle.
+            ends.append((foot, (0.0, 0.0, _TOE)))
+    return Skeleton((offsets * factor).astype(np.float32), BODY_JOINTS, BODY_PARENTS, tuple(sorted(ends)))
 
 
 def upper_body_skeleton(rig: Rig) -> Skeleton:
