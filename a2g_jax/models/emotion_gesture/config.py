@@ -8,6 +8,7 @@ from a2g_jax.models.train_config import TrainConfig
 HEADERS = ("aligned", "channels")
 BRANCHES = ("emotion-beat", "none", "label")
 POOLS = ("flat", "mean")
+SPANS = ("frames", "clip")
 PROMPTERS = ("spatial-temporal", "spatial", "predictor", "duplicate", "zero")
 PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
@@ -34,12 +35,19 @@ class EmotionGestureConfig:
     """Residual blocks of each stage of the audio encoder."""
     audio_channels: tuple[int, ...] = (32, 64, 128)
     """Channels of each stage."""
+    audio_stem: int = 1
+    """Stride of its first convolution, in time and frequency."""
     header: str = "aligned"
     """How the audio encoder gets to one row a frame: 'aligned' keeps the spectrogram's time and interpolates it to the
     frames; 'channels' makes a frame of each channel of a convolution, as the authors' code."""
     branches: str = "emotion-beat"
     """'emotion-beat': emotion and beat features (EBM); for ablations 'none': features of the audio as they are, and
     'label': the same with the emotion's label beside them."""
+    beat_normalised: bool = False
+    """Whether beat features have mean 0 and standard deviation 1 over a clip, so that what is constant in a clip, as
+    its emotion, cannot be in them."""
+    emotion_span: str = "frames"
+    """Whether emotion features are those of each frame, or their mean over the clip at every frame ('clip')."""
     emotion_pool: str = "flat"
     """What the emotion classifier takes: the features of all frames ('flat') or their mean ('mean')."""
     emotion_hidden: tuple[int, ...] = (512, 256, 64)
@@ -78,8 +86,8 @@ class EmotionGestureConfig:
     smoothing: int = 0
     """Binomial filters over time that end the decoder."""
     discriminator: str = "transformer"
-    """'transformer': of the differences between frames, as published; 'patches': convolutions over poses, differences
-    and the audio, with scores for overlapping stretches, given the emotion."""
+    """'transformer': of the differences between frames, as published; 'patches': convolutions over joint positions,
+    speeds and the audio, with scores for overlapping stretches, given the emotion."""
     discriminator_channels: int = 128
     """Width of the discriminator's layers."""
     discriminator_rate: float = 1.0
@@ -95,6 +103,8 @@ class EmotionGestureConfig:
     """Weight of the L1 distance of poses (Eq. 7)."""
     adversarial_weight: float = 1.0
     """Weight of the adversarial loss (Eq. 8); 0 trains without a discriminator."""
+    shown_emotion_weight: float = 0.0
+    """Weight of the emotion of generated motion as the discriminator classifies it; only with 'patches'."""
     beat_weight: float = 0.05
     """Weight of the beat alignment (Eq. 2), which needs words; 0 trains without them."""
     emotion_weight: float = 0.1
@@ -121,6 +131,7 @@ class EmotionGestureConfig:
         for name, known in (
             ("header", HEADERS),
             ("branches", BRANCHES),
+            ("emotion_span", SPANS),
             ("emotion_pool", POOLS),
             ("prompter", PROMPTERS),
             ("prompt_space", PROMPT_SPACES),
@@ -192,6 +203,9 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         dropout=0.1,
         audio_blocks=(1, 1, 1),
         audio_channels=(8, 16, 32),
+        audio_stem=2,
+        beat_normalised=True,
+        emotion_span="clip",
         emotion_pool="mean",
         emotion_hidden=(64,),
         word_width=64,
@@ -200,12 +214,12 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         query_positions=True,
         hold_seed=True,
         normalise_pose=True,
-        smoothing=1,
+        smoothing=2,
         discriminator="patches",
         discriminator_channels=64,
-        discriminator_rate=0.5,
         exchange=True,
-        reconstruction_weight=20.0,
+        reconstruction_weight=5.0,
+        shown_emotion_weight=0.3,
         beat_form="words",
         vae_steps=600,
     ),

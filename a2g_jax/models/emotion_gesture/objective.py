@@ -87,8 +87,12 @@ def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Ar
         if config.adversarial_weight > 0:
             frozen = params | {"discriminator": jax.lax.stop_gradient(params["discriminator"])}
             fake = judged(networks, frozen, batch, audio, made, dropout)
-            terms["adversarial"] = losses.generator_adversarial(networks.judge(frozen, *fake))
+            scores, shown = networks.judge(frozen, *fake)
+            terms["adversarial"] = losses.generator_adversarial(scores)
             weights["adversarial"] = config.adversarial_weight
+            if shown is not None and config.shown_emotion_weight > 0:
+                terms["shown_emotion"] = jnp.mean(optax.softmax_cross_entropy(shown, fake.label))
+                weights["shown_emotion"] = config.shown_emotion_weight
         if audio.logits is not None and config.emotion_weight > 0:
             assert batch.emotion is not None
             entropy = optax.softmax_cross_entropy_with_integer_labels(audio.logits, batch.emotion)
@@ -110,21 +114,26 @@ def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Ar
 
 
 def discriminator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
-    """The discriminator's side of Eq. 8; the generator is a constant.
+    """The discriminator's side of Eq. 8, and its classification of emotions; the generator is a constant.
 
     Args:
         training: with dropout in the generator.
     """
+    config = networks.config
 
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
         del step
         frozen = params | {"generator": jax.lax.stop_gradient(params["generator"])}
         dropout = key if training else None
         audio, made, target = generate(networks, frozen, batch, dropout)
-        real = networks.judge(params, target, batch.audio, one_hot(networks, batch))
-        fake = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout))
-        value = losses.discriminator_adversarial(real, fake)
-        return value, {"discriminator": value}
+        label = one_hot(networks, batch)
+        real, shown = networks.judge(params, target, batch.audio, label)
+        fake, _ = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout))
+        terms = {"discriminator": losses.discriminator_adversarial(real, fake)}
+        if shown is not None and config.shown_emotion_weight > 0:
+            # Of recorded motion only, so that the classes are those of people.
+            terms["recorded_emotion"] = jnp.mean(optax.softmax_cross_entropy(shown, label))
+        return sum(terms.values(), start=jnp.zeros(())), terms
 
     return loss
 
