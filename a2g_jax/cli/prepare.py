@@ -21,7 +21,17 @@ DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: th
 #: The generated corpus, and the data sets of this package.
 READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
-_GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
+_GENERATED = (
+    "minutes",
+    "speakers",
+    "emotions",
+    "languages",
+    "equal_emotions",
+    "jitter",
+    "fingers",
+    "view",
+    "on_demand",
+)
 _RECORDED = ("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled", "for_run")
 #: Flags that a run decides with ``--for``.
 _OF_RUN = ("features", "fps", "pose", "joints")
@@ -95,6 +105,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
     generated.add_argument("--speakers", metavar="NAMES", help="speakers, comma-separated (default: all)")
     generated.add_argument("--emotions", metavar="NAMES", help="emotions, comma-separated (default: all)")
+    generated.add_argument(
+        "--equal-emotions",
+        action="store_true",
+        help="emotions in equal shares; by default half of the recordings are neutral",
+    )
     generated.add_argument(
         "--languages",
         metavar="NAMES",
@@ -185,6 +200,7 @@ def _talker_options(options: argparse.Namespace, view: str) -> "TalkerOptions":
         speakers=speakers,
         emotions=emotions,
         languages=languages,
+        equal_emotions=options.equal_emotions,
         jitter=options.jitter or 0.0,
         fingers=options.fingers,
         view=view,

@@ -11,7 +11,6 @@ from audio2gestures_for_tests import BANDS, CONFIG, DATA, MAPPING, make_params
 from a2g_jax.data.batch import Batch
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.model import build
-
 from a2g_jax.models.judged_motion import judged_motion
 
 SIZE = 8

@@ -126,6 +126,8 @@ class EmotionGestureConfig:
     """Training steps of the emotion-conditioned VAE, after all others; 0 leaves it out."""
     vae_kl_weight: float = 0.003
     """Weight of its KL divergence against the relative squared error."""
+    vae_emotion_weight: float = 0.0
+    """Weight of the emotion that the classifier finds in features of random latents with a label."""
 
     def __post_init__(self) -> None:
         for name, known in (
@@ -219,9 +221,12 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         discriminator_channels=64,
         exchange=True,
         reconstruction_weight=5.0,
-        shown_emotion_weight=0.3,
+        emotion_weight=1.0,
+        shown_emotion_weight=1.0,
         beat_form="words",
         vae_steps=600,
+        vae_kl_weight=0.01,
+        vae_emotion_weight=0.6,
     ),
 }
 

@@ -142,11 +142,17 @@ class Networks:
         if not self.config.mines:
             return AudioFeatures(features)
         emotion = self._spanned(self._apply(params, "emotion", key, features))
-        logits: Any = self._generator["classifier"].apply({"params": params["generator"]["classifier"]}, emotion)
+        logits = self.classify(params, emotion)
         beat = self._apply(params, "beat", key, features)
         if self.config.beat_normalised:
             beat = standardised(beat)
         return AudioFeatures(beat, emotion, logits)
+
+    def classify(self, params: Params, emotion: Float[Array, "B N D"]) -> Float[Array, "B E"]:
+        """Logits of the emotions, from emotion features."""
+        own = {"params": params["generator"]["classifier"]}
+        logits: Float[Array, "B E"] = self._generator["classifier"].apply(own, emotion)
+        return logits
 
     def encode_text(self, params: Params, words: Int[Array, "B N"], key: DropoutKey = None) -> Float[Array, "B N D"]:
         """Features of a transcript; see :class:`~a2g_jax.models.emotion_gesture.mining.TextEncoder`."""

@@ -139,7 +139,11 @@ def discriminator_loss(networks: Networks, training: bool) -> Callable[..., tupl
 
 
 def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
-    """Relative squared error of emotion features and the KL divergence; everything else is a constant."""
+    """Relative squared error of emotion features, the KL divergence, and the emotion of features that are sampled.
+
+    The emotion classifier judges features of random latents with a label: without this term, latents that hold the
+    emotion themselves are an optimum too, in which the label has no effect. Everything but the VAE is a constant.
+    """
     config = networks.config
 
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
@@ -151,6 +155,12 @@ def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
         made = networks.decode_emotion(params, vae.draw(key, mean, log_variance), label)
         scale = frozen["vae"]["features"]["scale"]
         terms = {"vae_error": vae.relative_error(features, made, scale), "vae_kl": vae.divergence(mean, log_variance)}
-        return terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"], terms
+        loss = terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"]
+        if config.vae_emotion_weight > 0:
+            latent = jax.random.normal(jax.random.fold_in(key, 1), mean.shape, mean.dtype)
+            logits = networks.classify(frozen, networks.decode_emotion(params, latent, label))
+            terms["vae_emotion"] = jnp.mean(optax.softmax_cross_entropy(logits, label))
+            loss = loss + config.vae_emotion_weight * terms["vae_emotion"]
+        return loss, terms
 
     return loss
