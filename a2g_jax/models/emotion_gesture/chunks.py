@@ -116,7 +116,7 @@ def _chunk(
         features = features._replace(emotion=jnp.where(of_audio, features.emotion, sampled[None]))
     made = networks.decode(params, features, seed[None], labels)[0]
     before, new = made[: config.seed_frames], made[config.seed_frames :]
-    new = new + fade(sampling.seam_frames, config.stride) * (seed[-1:] - before[-1:])
+    new = new + seam(seed - before, sampling.seam_frames, config.stride)
     return networks.flat(space.valid(networks.pose(new[None])))[0]
 
 
@@ -131,7 +131,17 @@ def sample_emotion(
     return jnp.einsum("ne,end->nd", weights, each)
 
 
-def fade(frames: int, stride: int) -> Float[Array, "S 1"]:
-    """Weights that fall from almost 1 to 0, smoothly, over the first frames of a chunk."""
-    place = jnp.minimum((jnp.arange(stride) + 1.0) / (frames + 1.0), 1.0)
-    return (1.0 - place * place * (3.0 - 2.0 * place))[:, None] if frames else jnp.zeros((stride, 1))
+def seam(offsets: Float[Array, "M C"], frames: int, stride: int) -> Float[Array, "S C"]:
+    """What joins a chunk to the poses before it, without a step of place or speed: it fades out over some frames.
+
+    Args:
+        offsets: of the poses before the chunk from its own initial poses.
+        frames: how many; 0 for no join.
+    """
+    if frames == 0:
+        return jnp.zeros((stride, offsets.shape[1]), offsets.dtype)
+    # Hermite's cubic from the last offset and its speed to zero and rest.
+    span = frames + 1.0
+    place = jnp.minimum((jnp.arange(stride)[:, None] + 1.0) / span, 1.0)
+    rest = jnp.square(1.0 - place)
+    return rest * (1.0 + 2.0 * place) * offsets[-1:] + rest * place * span * (offsets[-1:] - offsets[-2:-1])

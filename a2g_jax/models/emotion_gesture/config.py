@@ -13,6 +13,8 @@ PROMPTERS = ("spatial-temporal", "spatial", "predictor", "duplicate", "zero")
 PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
 DISCRIMINATORS = ("transformer", "patches")
+#: Whole numbers that may be 0.
+_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps")
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,11 @@ class EmotionGestureConfig:
     smooth_temperature: float = 10.0
     """Divisor of the true motion's offsets in the motion-smooth loss."""
 
+    mining_steps: int = 0
+    """Training steps of the features of audio and text alone, before all others."""
+    sampled_steps: int = 0
+    """Training steps of the motion with sampled emotion features, after the VAE: with 'exchange', the emotions that the
+    discriminator judges are then sampled."""
     vae_latent: int = 32
     """Length of the emotion-conditioned VAE's latent."""
     vae_channels: int = 40
@@ -153,14 +160,13 @@ class EmotionGestureConfig:
                 raise _refused(field.name, "0 or more", value)
             if field.name.endswith("_temperature") and not 0 < value < float("inf"):
                 raise _refused(field.name, "a number above 0", value)
-            if field.type in (int, "int") and field.name not in ("vae_steps", "smoothing") and value < 1:
+            if field.type in (int, "int") and field.name not in _MAYBE_NONE and value < 1:
                 raise _refused(field.name, "1 or more", value)
-        if self.smoothing < 0:
-            raise _refused("smoothing", "0 or more", self.smoothing)
+        for name in _MAYBE_NONE:
+            if getattr(self, name) < 0:
+                raise _refused(name, "0 or more", getattr(self, name))
         if not 0 < self.discriminator_rate < float("inf"):
             raise _refused("discriminator_rate", "a number above 0", self.discriminator_rate)
-        if self.vae_steps < 0:
-            raise _refused("vae_steps", "0 or more", self.vae_steps)
         if not 0 <= self.dropout < 1:
             raise _refused("dropout", "0 or more and below 1", self.dropout)
         for name in ("channels", "discriminator_channels"):
@@ -183,6 +189,11 @@ class EmotionGestureConfig:
     def mines(self) -> bool:
         """Whether there are emotion and beat features."""
         return self.branches == "emotion-beat"
+
+    @property
+    def trains_sampled(self) -> bool:
+        """Whether motion is trained with sampled emotion features."""
+        return self.exchanges and self.vae_steps > 0 and self.sampled_steps > 0 and self.adversarial_weight > 0
 
     @property
     def exchanges(self) -> bool:
@@ -224,7 +235,10 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         emotion_weight=1.0,
         shown_emotion_weight=1.0,
         beat_form="words",
-        vae_steps=600,
+        beat_weight=0.3,
+        mining_steps=1_500,
+        vae_steps=400,
+        sampled_steps=1_000,
         vae_kl_weight=0.01,
         vae_emotion_weight=0.6,
     ),

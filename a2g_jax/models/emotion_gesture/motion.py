@@ -11,6 +11,8 @@ from a2g_jax.nn.rates import smoothed
 from a2g_jax.nn.strided import StridedConv1D
 from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
 
+#: Factor on the speed of the last initial pose, for each frame after it.
+_SLOWING = 0.6
 #: Layers of the patch discriminator that halve time; a score depends on 22 frames.
 _HALVINGS = 3
 
@@ -49,7 +51,10 @@ class PoseDecoder(nn.Module):
 
 
 class SeedHold(nn.Module):
-    """The initial poses, and after them the last one on its way to a mean pose, by a learned share for each value."""
+    """The initial poses, and after them the last one on its way to a mean pose, by a learned share for each value.
+
+    The last pose keeps moving first, slower with each frame, so that the speed has no step.
+    """
 
     frames: int
 
@@ -58,7 +63,9 @@ class SeedHold(nn.Module):
         later = self.frames - seed.shape[1]
         share = nn.sigmoid(self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2])))[None]
         centre = mean[None, None]
-        return jnp.concatenate([seed, centre + share * (seed[:, -1:] - centre)], axis=1)
+        way = jnp.cumsum(_SLOWING ** (1.0 + jnp.arange(later)))[None, :, None]
+        held = seed[:, -1:] + way * (seed[:, -1:] - seed[:, -2:-1])
+        return jnp.concatenate([seed, centre + share * (held - centre)], axis=1)
 
 
 class PatchDiscriminator(nn.Module):

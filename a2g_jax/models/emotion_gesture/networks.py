@@ -26,6 +26,8 @@ from a2g_jax.nn.transformer import Encoder
 
 #: Added to standard deviations of emotion features, before division.
 _LEAST = 1e-3
+#: Networks of the features of audio and text.
+_MINING = ("audio", "emotion", "beat", "classifier", "text")
 #: Source of dropout: None for none.
 DropoutKey = Key[Array, ""] | None
 
@@ -219,6 +221,13 @@ class Networks:
         own = jax.lax.stop_gradient(params["vae"]["features"])
         scores: Any = self._vae_decoder.apply({"params": params["vae"]["decoder"]}, latent, label)
         return self._spanned(scores * own["scale"][None, None] + own["mean"][None, None])
+
+    def freeze_mining(self, params: Params) -> Params:
+        """The parameters with the networks of the features of audio and text, and the VAE, as constants."""
+        generator = {
+            name: jax.lax.stop_gradient(own) if name in _MINING else own for name, own in params["generator"].items()
+        }
+        return params | {"generator": generator, "vae": jax.lax.stop_gradient(params["vae"])}
 
     def measure_features(self, params: Params, audio: Float[Array, "B N bands"]) -> Params:
         """The parameters with mean and standard deviation of the emotion features of clips, for the VAE."""
