@@ -89,7 +89,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="for_run",
         metavar="RUN",
-        help="rate, mel bands, poses and body of a run, for 'a2g train --from RUN': a run folder, demo or demo-flow",
+        help="rate, mel bands, poses and body of a run, for 'a2g train --from RUN': a run folder, demo, demo-flow or"
+        " demo-emotion",
     )
     recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
     recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--from",
         dest="source",
         metavar="RUN",
-        help="start from the weights of a run (a folder, or demo or demo-flow), with its settings, to adapt it to one"
+        help="start from the weights of a run (a folder, or demo, demo-flow or demo-emotion), with its settings, to adapt it to one"
         " to ten minutes of a person's recordings; prepare these with 'a2g prepare ... --for RUN'",
     )
     parser.add_argument(

@@ -17,8 +17,8 @@ def inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None =
     """Facts about a file, a folder of recordings, a corpus or a run, and its likely faults.
 
     Args:
-        name: path of the file or folder, or the name of a run that comes with the package: ``"demo"`` or
-            ``"demo-flow"``. ``"./demo"`` is a folder of that name.
+        name: path of the file or folder, or the name of a run that comes with the package: ``"demo"``,
+            ``"demo-flow"`` or ``"demo-emotion"``. ``"./demo"`` is a folder of that name.
         audio: the speech that belongs to a motion or a transcript.
 
     Raises:
