@@ -256,7 +256,6 @@ TRAINING_PRESETS: dict[str, TrainConfig] = {
         warmup_steps=100,
         clip_norm=1.0,
         augmentation=1.0,
-        mirror=0.5,
         checkpoint_every=500,
         validate_every=500,
     ),
