@@ -56,6 +56,9 @@ def judged(
 ) -> Judged:
     """The motions of a batch, and those with the emotion of the next clip, if exchanged.
 
+    With sampled features every other clip keeps its own emotion: a chunk in generation begins with poses that already
+    show the emotion, and must not show more and more of it.
+
     Args:
         latent: of the VAE, to sample the features of those emotions; None for the features of the next clips.
     """
@@ -63,7 +66,11 @@ def judged(
     if not networks.config.exchanges or audio.emotion is None:
         return Judged(made, batch.audio, label)
     wanted = jnp.roll(label, 1, axis=0)
-    features = jnp.roll(audio.emotion, 1, axis=0) if latent is None else networks.decode_emotion(params, latent, wanted)
+    if latent is None:
+        features = jnp.roll(audio.emotion, 1, axis=0)
+    else:
+        wanted = jnp.where(jnp.arange(len(label))[:, None] % 2 == 0, label, wanted)
+        features = networks.decode_emotion(params, latent, wanted)
     seed = networks.flat(batch.pose)[:, : networks.config.seed_frames]
     exchanged = networks.decode(params, audio._replace(emotion=features), seed, None, key)
     return Judged(
