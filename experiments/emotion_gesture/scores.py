@@ -99,19 +99,21 @@ def _distance(made: Made, bench: Bench) -> dict[str, Cell]:
 def seam(places: Float[np.ndarray, "N S T P _"], bench: Bench) -> dict[str, Cell]:
     """Speed and jerk where the given poses end, relative to the recorded motion's at the same frames.
 
-    Speeds are those of the steps to frames 10 and 11, jerks those of the four stretches of four frames that have the
-    step to frame 10, or begin with frame 10: mean over joints, clips and samples. ``seam_speed_error`` and
+    Speeds are those of the steps to frames 10 and 11, jerks those of the three stretches of four frames with the step to
+    frame 10: means over joints, clips and samples. ``seam_speed_error`` and
     ``seam_jerk_error`` are the distances of the ratios from 1, as absolute logarithms.
     """
     given = np.broadcast_to(bench.places[:, None, :FIRST], (*places.shape[:2], FIRST, *places.shape[3:]))
     ours, scores = np.concatenate([given, places], axis=2), {}
-    for name, order, first in (("seam_speed", 1, FIRST - 1), ("seam_jerk", 3, FIRST - 3)):
-        rows = slice(first, FIRST + 1 + order)
+    for name, order, rows in (
+        ("seam_speed", 1, slice(FIRST - 1, FIRST + 2)),
+        ("seam_jerk", 3, slice(FIRST - 3, FIRST + 3)),
+    ):
         size = [
             np.linalg.norm(np.diff(one[..., rows, :, :], n=order, axis=-3), axis=-1).mean()
             for one in (ours, bench.places)
         ]
-        ratio = size[0] / size[1]
+        ratio = size[0] / max(size[1], 1e-9)
         scores |= {name: cell(ratio), f"{name}_error": cell(abs(np.log(max(ratio, 1e-9))))}
     return scores
 
