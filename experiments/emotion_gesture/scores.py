@@ -99,16 +99,14 @@ def _distance(made: Made, bench: Bench) -> dict[str, Cell]:
 def seam(places: Float[np.ndarray, "N S T P _"], bench: Bench) -> dict[str, Cell]:
     """Speed and jerk where the given poses end, relative to the recorded motion's at the same frames.
 
-    Speeds are those of the steps to frames 10 and 11, jerks those of the three stretches of four frames with the step to
-    frame 10: means over joints, clips and samples. ``seam_speed_error`` and
-    ``seam_jerk_error`` are the distances of the ratios from 1, as absolute logarithms.
+    Speeds are those of the steps to frames 10 and 11, jerks those of the three stretches of four frames with the step
+    to frame 10: means over joints, clips and samples. ``seam_speed_error`` and ``seam_jerk_error`` are the distances of
+    the ratios from 1, as absolute logarithms.
     """
     given = np.broadcast_to(bench.places[:, None, :FIRST], (*places.shape[:2], FIRST, *places.shape[3:]))
     ours, scores = np.concatenate([given, places], axis=2), {}
-    for name, order, rows in (
-        ("seam_speed", 1, slice(FIRST - 1, FIRST + 2)),
-        ("seam_jerk", 3, slice(FIRST - 3, FIRST + 3)),
-    ):
+    stretches = {"seam_speed": (1, slice(FIRST - 1, FIRST + 2)), "seam_jerk": (3, slice(FIRST - 3, FIRST + 3))}
+    for name, (order, rows) in stretches.items():
         size = [
             np.linalg.norm(np.diff(one[..., rows, :, :], n=order, axis=-3), axis=-1).mean()
             for one in (ours, bench.places)

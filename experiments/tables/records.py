@@ -36,7 +36,12 @@ def name_of(corpus: Corpus) -> str:
 
 
 #: Fields of a recipe that determine the recordings.
-_RECIPE = frozenset({"minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"})
+_RECIPE = frozenset(
+    {
+        *("minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"),
+        *("equal_emotions", "languages", "synthesizer"),
+    }
+)
 
 
 def results(paper: str) -> Path:
