@@ -15,7 +15,7 @@ from a2g_jax.training.run import Run
 from experiments.emotion_gesture.bench import FIRST, TRUTH, Bench, Made
 from experiments.emotion_gesture.page import render
 from experiments.emotion_gesture.scores import cell, scores_of
-from experiments.emotion_gesture.settings import TINY, ours, paper
+from experiments.emotion_gesture.settings import TINY, ours, paper, scaled
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, current, path_of, records
@@ -89,7 +89,7 @@ def compute(where: Setting, clean: Corpus, only: list[str] | None) -> None:
             fields = {"variant": name, "seed": seed, **measured, "steps": 0}
             if not any(all(one.get(key) == value for key, value in fields.items()) for one in records(TABLE.name)):
                 append(TABLE.name, {**fields, **against_clean(motion[:, None, FIRST:], bench, seed)})
-    run_table(TABLE.name, VARIANTS, where, only, score, "clean motion")
+    run_table(TABLE.name, scaled(VARIANTS, where.steps), where, only, score, "clean motion")
 
 
 def against_clean(made: Made, bench: Bench, seed: int) -> dict[str, Any]:

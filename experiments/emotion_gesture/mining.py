@@ -21,7 +21,7 @@ from a2g_jax.models.emotion_gesture.networks import Networks
 from a2g_jax.training.run import Run
 from experiments.emotion_gesture.page import render
 from experiments.emotion_gesture.scores import cell
-from experiments.emotion_gesture.settings import FULL, TINY, ours, paper
+from experiments.emotion_gesture.settings import FULL, TINY, ours, paper, scaled
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, current, path_of, records
@@ -30,8 +30,8 @@ from experiments.tables.runs import Ruler, Setting, described, measure, run_tabl
 #: Clips of one call; training recordings that probes are fitted to; frames of them for onsets; steps of the solver.
 _BATCH, _FITTED, _FRAMES, _STEPS = 16, 60, 12_000, 400
 
-ALIGNED, CHANNELS = "the paper's parts", "the paper's parts, authors' header"
-OURS, OURS_CHANNELS = "tiny", "tiny, authors' header"
+ALIGNED, CHANNELS = "the paper's parts", "the paper's parts with the authors' header"
+OURS, OURS_CHANNELS = "tiny", "tiny with the authors' header"
 UNTRAINED = "untrained"
 
 VARIANTS = {
@@ -150,7 +150,7 @@ def _probe(rows: Float[np.ndarray, "n D"], labels: np.ndarray) -> tuple[Any, Any
 def held_out(run: Run, corpus: Corpus, seed: int) -> dict[str, float]:
     """Losses on test clips, and the share of them whose emotion the model's own classifier finds."""
     config, model = run.config, run.config.build()
-    loss = model.stages[0].validation_loss
+    loss = next(stage for stage in model.stages if stage.name == "main").validation_loss
     assert loss is not None
     shape = clip_shape(model.batch_fields, model.clip_frames, corpus.fps, corpus.mel.sample_rate)
     arrays = {name: corpus.array(name) for name in shape.arrays}
@@ -185,7 +185,8 @@ def main() -> None:
     if options.corpus is not None:
         where = replace(setting_of(options), judge=None, features=None)
         untrained(where)
-        run_table(TABLE.name, VARIANTS, where, options.only.split(",") if options.only else None, mined, "probes")
+        only = options.only.split(",") if options.only else None
+        run_table(TABLE.name, scaled(VARIANTS, where.steps), where, only, mined, "probes")
     if not current(TABLE.name):
         print(f"{TABLE.name}: there are no records yet; give a corpus with --corpus.")
         return

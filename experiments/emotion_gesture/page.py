@@ -93,16 +93,12 @@ def about(found: Sequence[Mapping[str, Any]]) -> list[str]:
         f" records, {minutes:.0f} minutes of training on 2 cores shared with other work;"
         f" {last['clips']} test clips, {last['samples']} samples of each."
     ]
-    if len(steps) > 1:
-        seconds: dict[str, list[float]] = {}
-        for record in trained:
-            seconds.setdefault(record["variant"], []).append(record["train_cpu_seconds"])
-        lines += ["", "Seconds of processor time of a training (mean over seeds): "]
-        lines[-1] += ", ".join(
-            f"{name} {sum(values) / len(values):.0f}" for name, values in seconds.items() if max(values)
-        )
-        lines[-1] += "."
-    return lines
+    seconds: dict[str, list[float]] = {}
+    for record in trained:
+        seconds.setdefault(record["variant"], []).append(record["train_cpu_seconds"])
+    means = {name: sum(values) / len(values) for name, values in seconds.items() if max(values)}
+    said = ", ".join(f"{name} {value:.0f}" for name, value in means.items())
+    return [*lines, "", f"Seconds of processor time of a training, with all its stages (mean over seeds): {said}."]
 
 
 def cell_text(table: str, variant: str, key: str) -> str:

@@ -6,7 +6,8 @@ saturated) and a position encoding of the decoder's queries (without one, zeros 
 else ``tiny`` has is its own row.
 """
 
-from dataclasses import asdict, fields
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 from a2g_jax.models import find_model
@@ -30,6 +31,10 @@ BASE: dict[str, Any] = {
     field.name: getattr(_ENTRY.config(), field.name) for field in fields(_ENTRY.config) if field.name not in _KEPT
 } | {"seam_frames": 0, "discriminator_hidden": (256, 64, 16)}
 
+#: Stages of training besides the main one and the emotion-conditioned VAE, and the steps of the main one in the preset.
+_STAGES = [field.name for field in fields(_ENTRY.config) if field.name.endswith("_steps") and field.name != "vae_steps"]
+PRESET_STEPS = _ENTRY.training_preset("tiny").steps
+
 #: Training settings of the preset; the table has its own steps and seeds.
 TRAINING = {
     name: value
@@ -49,6 +54,22 @@ def ours(trained_as: str = "", generation: dict[str, Any] | None = None, **chang
 def paper(**changes: Any) -> Variant:
     """The paper's method with changes, without the emotion-conditioned VAE unless given its steps."""
     return ours(**{**BASE, "vae_steps": 0, **changes})
+
+
+def scaled(variants: Mapping[str, Variant], steps: int) -> dict[str, Variant]:
+    """Rows whose further stages have the same share of a table's steps as of the preset's.
+
+    The VAE is small and keeps its steps, up to the table's.
+    """
+    return {name: _scaled(variant, steps) if variant.model == MODEL else variant for name, variant in variants.items()}
+
+
+def _scaled(variant: Variant, steps: int) -> Variant:
+    own = {name: variant.changes.get(name, getattr(TINY, name)) for name in (*_STAGES, "vae_steps")}
+    found = {
+        name: min(own[name], steps) if name == "vae_steps" else round(own[name] * steps / PRESET_STEPS) for name in own
+    }
+    return replace(variant, changes={**variant.changes, **found})
 
 
 #: The full method of the paper; its chunk length is that of the preset.

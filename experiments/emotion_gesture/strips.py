@@ -19,6 +19,7 @@ from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.training.run import Run, load_run
 from experiments.emotion_gesture import table2
+from experiments.emotion_gesture.settings import scaled
 from experiments.emotion_gesture.table import setting_of
 from experiments.emotion_gesture.table1 import EMOTIONS
 from experiments.motion.rows import Row
@@ -56,7 +57,7 @@ def run_of(name: str, where: Setting, corpus: Corpus) -> Run:
     Raises:
         InputError: it is not trained yet.
     """
-    folder: Path = folder_of(name, table2.VARIANTS, where.seeds[0], corpus, where)
+    folder: Path = folder_of(name, scaled(table2.VARIANTS, where.steps), where.seeds[0], corpus, where)
     if not folder.is_dir():
         raise InputError(
             f"{folder}: there is no run of {name!r}; run table2 with the same --corpus, --runs and --steps."

@@ -11,6 +11,7 @@ from a2g_jax.training.run import Run
 from experiments.emotion_gesture.bench import NULLS, TRUTH, Bench
 from experiments.emotion_gesture.requests import requested, takes_requests, true_emotions
 from experiments.emotion_gesture.scores import scores_of
+from experiments.emotion_gesture.settings import scaled
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, current, path_of, records
 from experiments.tables.runs import Ruler, Setting, Variant, arguments, measure, run_table, setting
@@ -77,7 +78,7 @@ def compute(table: Table, where: Setting, only: Sequence[str] | None) -> None:
     ruler, measured = measure(table.name, where)
     bench = Bench(ruler)
     score_nulls(table, bench, measured, where.seeds)
-    run_table(table.name, table.variants, where, only, continued(bench, table.requests), SCORED)
+    run_table(table.name, scaled(table.variants, where.steps), where, only, continued(bench, table.requests), SCORED)
 
 
 def continued(bench: Bench, requests: bool) -> Callable[[str, Run, Ruler, int], dict[str, Any]]:

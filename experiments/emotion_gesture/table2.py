@@ -13,7 +13,7 @@ from experiments.stylized_flow.settings import TRAINING as FLOW_TRAINING
 from experiments.tables.claims import Claim
 from experiments.tables.runs import Variant
 
-CONSTANT, DIVERSE = "ours, constant", "ours, diverse"
+CONSTANT, DIVERSE = "ours (constant)", "ours (diverse)"
 A2G, FLOW, S2G = "Audio2Gestures", "stylized flow", "Speech2Gesture"
 
 #: Clips and context of the flow within the given poses and the audio of a clip.

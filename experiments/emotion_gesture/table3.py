@@ -5,14 +5,16 @@
 Without a corpus the table is rendered from the existing records.
 """
 
-from experiments.emotion_gesture.settings import FULL, SAMPLED, TINY, ours, paper
+from dataclasses import replace
+
+from experiments.emotion_gesture.settings import FULL, PRESET_STEPS, SAMPLED, TINY, ours, paper
 from experiments.emotion_gesture.table import Table, command
 from experiments.tables.claims import Claim
 
-BASELINE, LABEL, EAD = "baseline", "baseline, one-hot label", "+ EAD"
+BASELINE, LABEL, EAD = "baseline", "baseline with one-hot label", "+ EAD"
 EMO, BEAT, SPATIAL, TEMPORAL = "+ L_emo", "+ L_beat", "+ spatial", "+ temporal"
 SMOOTH, SAMPLING = "+ L_smooth", "+ sampling"
-OURS, OURS_SAMPLING, OURS_LABEL = "tiny", "tiny, sampling", "tiny, one-hot label"
+OURS, OURS_SAMPLING, OURS_LABEL = "tiny", "tiny with sampling", "tiny with one-hot label"
 
 _NONE = {"prompter": "predictor", "emotion_weight": 0.0, "beat_weight": 0.0, "smooth_weight": 0.0}
 _EMO = {**_NONE, "emotion_weight": TINY.emotion_weight}
@@ -30,7 +32,8 @@ VARIANTS = {
     SAMPLING: ours(SMOOTH, SAMPLED, **FULL.changes),
     OURS: ours(),
     OURS_SAMPLING: ours(OURS, SAMPLED),
-    OURS_LABEL: ours(branches="label"),
+    # As many steps of motion in one stage, since sampled features have a stage of their own.
+    OURS_LABEL: replace(ours(branches="label"), steps=1.0 + getattr(TINY, "sampled_steps", 0) / PRESET_STEPS),
 }
 
 CLAIMS = (

@@ -13,7 +13,7 @@ from experiments.tables.claims import Claim
 
 LENGTHS = (2, 4, 6, 8, 10)
 ZERO, DUPLICATE, LONGEST = "zero", "duplicate", "L = 10"
-OURS, OURS_ZERO, OURS_DUPLICATE = "tiny, L = 10", "tiny, zero", "tiny, duplicate"
+OURS, OURS_ZERO, OURS_DUPLICATE = "tiny (L = 10)", "tiny (zero)", "tiny (duplicate)"
 
 
 def _length(frames: int):
@@ -59,7 +59,9 @@ CLAIMS = (
         for name in (ZERO, DUPLICATE)
     ),
     *(
-        Claim(f"(tiny) the {what} across the seam is closer than with {name[6:]}", OURS, name, f"seam_{what}_error", -1)
+        Claim(
+            f"(tiny) the {what} across the seam is closer than with {name[6:-1]}", OURS, name, f"seam_{what}_error", -1
+        )
         for what in ("speed", "jerk")
         for name in (OURS_ZERO, OURS_DUPLICATE)
     ),

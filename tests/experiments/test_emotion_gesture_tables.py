@@ -13,7 +13,7 @@ from experiments.emotion_gesture import claims, jitter, mining, page, table1, ta
 from experiments.emotion_gesture.bench import CLIP, FIRST, MADE, Bench, check_independent
 from experiments.emotion_gesture.requests import _Tally
 from experiments.emotion_gesture.scores import seam
-from experiments.emotion_gesture.settings import BASE, TINY
+from experiments.emotion_gesture.settings import BASE, PRESET_STEPS, TINY, scaled
 from experiments.tables import records as store
 from experiments.tables.claims import Claim
 from experiments.tables.records import append
@@ -56,6 +56,7 @@ def test_rows_are_settings_that_models_accept_and_claims_are_of_rows(name):
     for claim in table.claims:
         assert {claim.first, claim.second} <= rows, claim
         assert claim.baseline in ("", claim.first, claim.second)
+    assert not any("," in one for one in table.variants)  # --only separates names by commas
     # A row whose settings equal another's would be a copy of it.
     own = [variant for variant in table.variants.values() if not variant.trained_as]
     assert len({str((one.model, settings_of(one, table.variants))) for one in own}) == len(own)
@@ -86,11 +87,11 @@ def test_a_page_has_our_rows_the_nulls_and_the_papers_figures():
         add("table2", table2.S2G, seed, position_l2=6.0 + seed, emotion_balanced={"mean": 0.2, "chance": 0.125})
         add("table2", "mean pose", seed, 0, position_l2=5.0)
     text = page.render(replace(table2.TABLE, claims=(Claim("lower", table2.CONSTANT, table2.S2G, "position_l2", -1),)))
-    assert "| ours, constant | 3 | 5.00 +- 2.48 | 2.00 +- 0.00 | 40.0 +- 0.0 |" in text  # other columns are empty
+    assert "| ours (constant) | 3 | 5.00 +- 2.48 | 2.00 +- 0.00 | 40.0 +- 0.0 |" in text  # other columns are empty
     assert "FGD is of 400 vectors" in text
     assert "- lower: **holds: -2 +- 0 over 3 seeds**" in text
     assert "chance is 12.5 %" in text
-    assert text.index("| ours, constant |") < text.index("| mean pose |") < text.index("- Ours, constant: 1.59")
+    assert text.index("| ours (constant) |") < text.index("| mean pose |") < text.index("- Ours, constant: 1.59")
 
 
 def test_the_first_table_has_a_picture_of_all_seeds(folder):
@@ -222,3 +223,18 @@ def test_probes_find_what_is_there():
         values[..., 2] *= np.where(labels, 3.0, 1.0)[:, None]
     assert mining.emotion_share(fit, labels, test, labels) > 0.95
     assert mining.emotion_share(fit[..., :2], labels, test[..., :2], labels) < 0.8
+
+
+def test_stages_are_scaled_with_the_steps_of_a_table():
+    half = scaled(table3.VARIANTS, PRESET_STEPS // 2)
+    full = scaled(table3.VARIANTS, PRESET_STEPS)
+    for name, variant in full.items():
+        for setting in variant.changes:
+            if setting.endswith("_steps") and setting != "vae_steps":
+                own = getattr(settings_of(table3.VARIANTS[name], table3.VARIANTS), setting)
+                assert variant.changes[setting] == own or variant.trained_as
+                assert half[name].changes[setting] == pytest.approx(variant.changes[setting] / 2, abs=0.5)
+    assert scaled(table3.VARIANTS, 5)[table3.OURS].changes["vae_steps"] == 5
+    assert full[table3.BASELINE].changes["vae_steps"] == 0
+    others = {name: variant for name, variant in table2.VARIANTS.items() if variant.model != "emotion_gesture"}
+    assert {name: scaled(table2.VARIANTS, 5)[name] for name in others} == others
