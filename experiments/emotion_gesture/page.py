@@ -52,7 +52,7 @@ def render(table: Table) -> str:
     found = current(table.name)
     columns = [name for name in table.columns if any(name in record["scores"] for record in found)]
     lines = [f"# {table.title}", "", *about(found), ""]
-    head = [_title(METRICS.get(name, _percent(name)), found) for name in columns]
+    head = [_title(_metric(name), found) for name in columns]
     lines += [f"| | seeds | {' | '.join(head)} |", "|" + " --- |" * (len(columns) + 2)]
     for name in rows_of(table, found):
         seeds = len({record["seed"] for record in found if record["variant"] == name})
@@ -75,6 +75,11 @@ def render(table: Table) -> str:
     return "\n".join(lines)
 
 
+def _metric(key: str) -> Metric:
+    """A metric; those that have no entry are shares, and levels of chance among them."""
+    return METRICS.get(key, _percent(key, "truth" if key.startswith("chance") else "higher"))
+
+
 def rows_of(table: Table, found: Sequence[Mapping[str, Any]]) -> list[str]:
     """Rows of a page: variants, then nulls, then other untrained rows."""
     return list(dict.fromkeys([*table.variants, *NULLS, *(record["variant"] for record in found)]))
@@ -88,10 +93,12 @@ def about(found: Sequence[Mapping[str, Any]]) -> list[str]:
     steps = sorted({record["trained_steps"] for record in trained})
     minutes = sum(record["train_seconds"] for record in trained) / 60
     last = trained[-1]
+    # Scores of generated motion only.
+    samples = f", {last['samples']} samples of each" if "position_l2" in last["scores"] else ""
     lines = [
         f"Corpus {last['corpus']}; the preset tiny's size, {', '.join(map(str, steps))} steps a run, {len(trained)}"
         f" records, {minutes:.0f} minutes of training on 2 cores shared with other work;"
-        f" {last['clips']} test clips, {last['samples']} samples of each."
+        f" {last['clips']} test clips{samples}."
     ]
     seconds: dict[str, list[float]] = {}
     for record in trained:
@@ -103,7 +110,7 @@ def about(found: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def cell_text(table: str, variant: str, key: str) -> str:
     """A score over seeds with its interval; ``-`` without one."""
-    found, metric = over_seeds(table, variant, key), METRICS.get(key, _percent(key))
+    found, metric = over_seeds(table, variant, key), _metric(key)
     if found is None:
         return "-"
     mean, half, count = found

@@ -72,8 +72,9 @@ def picture() -> None:
         found = [record for record in current(TABLE.name) if record["variant"] == name]
         if found:
             counts = np.sum([record["confusion"] for record in found], axis=0)
+            seeds = ", ".join(str(record["seed"]) for record in found)
             accuracy = 100 * np.trace(counts) / counts.sum()
-            panels.append(Panel(f"{name}: {accuracy:.1f} %, {len(found)} seeds", found[-1]["emotions"], counts))
+            panels.append(Panel(f"{name}: {accuracy:.1f} %, seeds {seeds}", found[-1]["emotions"], counts))
     if panels:
         save_confusion(path_of(TABLE.name, ".png"), panels)
 
