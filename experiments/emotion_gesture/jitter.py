@@ -9,6 +9,8 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.training.run import Run
@@ -94,8 +96,6 @@ def compute(where: Setting, clean: Corpus, only: list[str] | None) -> None:
 
 def against_clean(made: Made, bench: Bench, seed: int) -> dict[str, Any]:
     """Scores with the jerk relative to the clean motion's; ``jerk_error`` is the distance of the ratio from 1."""
-    import numpy as np
-
     found = scores_of(made, bench, seed)
     clean = scores_of(bench.pose[:, None, FIRST:], bench, seed)["scores"]["jerk"]["mean"]
     ratio = found["scores"]["jerk"]["mean"] / clean
