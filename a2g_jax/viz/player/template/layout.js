@@ -13,7 +13,7 @@ const LABEL = 88; // CSS pixels that a figure's label needs to be legible
 function chooseRows(count, spacing, tall, width, height) {
   let best = 1, bestScale = 0;
   const most = Math.min(count, 4);
-  for (let rows = count > 6 ? 2 : 1; rows <= most; rows++) {
+  for (let rows = 1; rows <= most; rows++) {
     const columns = Math.ceil(count / rows);
     if (width / columns < LABEL && rows < most) continue;
     const scale = Math.min((height / rows - 90) / tall, width / (columns * spacing));
