@@ -1,5 +1,7 @@
 """Beat and emotion features of speech, and those that the VAE samples."""
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def test_features_are_those_of_the_chunks(run, space):
     # The second chunk: a clip of 60 frames whose first 10 are the last of the first.
     rows = run.config.statistics["audio"].normalise(speech_features(run, audio)[40:100])
     networks = Networks(run.config.model_config, run.config.data())
-    clip = networks.encode_audio(run.params, np.asarray(rows, np.float32)[None])
+    clip = jax.jit(networks.encode_audio)(jax.device_put(run.params), jnp.asarray(rows, jnp.float32)[None])
     np.testing.assert_allclose(found.beat[50:100], clip.beat[0, 10:], atol=1e-4)
     np.testing.assert_allclose(found.emotion[50:100], clip.emotion[0, 10:], atol=1e-4)
     # Whole chunks do not depend on the speech after them.
@@ -42,8 +44,9 @@ def test_features_are_those_of_the_chunks(run, space):
 def test_sampled_features_are_of_their_emotion_and_share_latents(run, space):
     networks = Networks(run.config.model_config, run.config.data())
     drawn = {emotion: space.sample(emotion, 12, seed=1) for emotion in space.emotions}
-    found = [np.asarray(networks.classify(run.params, each)).argmax(axis=1) for each in drawn.values()]
-    assert np.mean(np.stack(found) == np.arange(len(drawn))[:, None]) > 0.7
+    classify, params = jax.jit(networks.classify), jax.device_put(run.params)
+    found = np.stack([np.asarray(classify(params, jnp.asarray(each))).argmax(axis=1) for each in drawn.values()])
+    assert np.mean(found == np.arange(len(drawn))[:, None]) > 0.7
     half = space.sample("anger:0.5,sadness:0.5", 12, seed=1)
     np.testing.assert_allclose(half, (drawn["anger"] + drawn["sadness"]) / 2, atol=1e-4)
     assert np.abs(drawn["anger"][0] - drawn["anger"][1]).max() > 1e-3

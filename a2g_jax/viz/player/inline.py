@@ -24,9 +24,7 @@ class InlinePage:
     def _repr_html_(self) -> str:
         # The text stands in the attribute itself, so that a notebook needs no file beside it.
         source = html.escape(self.page, quote=True)
-        return (
-            f'<iframe srcdoc="{source}" width="100%" height="{self.height}" style="border: 0" allowfullscreen></iframe>'
-        )
+        return f'<iframe srcdoc="{source}" width="100%" height="{self.height}" style="border: 0"></iframe>'
 
 
 def show_page(
