@@ -34,9 +34,6 @@ def test_features_are_those_of_the_chunks(run, space):
     clip = jax.jit(networks.encode_audio)(jax.device_put(run.params), jnp.asarray(rows, jnp.float32)[None])
     np.testing.assert_allclose(found.beat[50:100], clip.beat[0, 10:], atol=1e-4)
     np.testing.assert_allclose(found.emotion[50:100], clip.emotion[0, 10:], atol=1e-4)
-    # Whole chunks do not depend on the speech after them.
-    shorter = space.of_audio(audio[: 16000 * 20 // 3])
-    np.testing.assert_allclose(shorter.emotion[:100], found.emotion[:100], atol=1e-4)
     with pytest.raises(InputError, match="less than a frame"):
         space.of_audio(np.zeros(100, np.float32))
 
