@@ -47,7 +47,7 @@ def test_sampled_features_are_of_their_emotion_and_share_latents(run, space):
     half = space.sample("anger:0.5,sadness:0.5", 12, seed=1)
     np.testing.assert_allclose(half, (drawn["anger"] + drawn["sadness"]) / 2, atol=1e-4)
     assert np.abs(drawn["anger"][0] - drawn["anger"][1]).max() > 1e-3
-    np.testing.assert_array_equal(space.sample("anger", 3, seed=1), drawn["anger"][:3])
+    np.testing.assert_allclose(space.sample("anger", 3, seed=1), drawn["anger"][:3], atol=1e-5)
     still = space.sample("anger", 2, temperature=0.0)
     np.testing.assert_allclose(still[0], still[1], atol=1e-6)
 
