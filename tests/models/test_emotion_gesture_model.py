@@ -10,7 +10,7 @@ from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_batch, make
 
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Condition
-from a2g_jax.models.emotion_gesture.chunks import sample_emotion, seam
+from a2g_jax.models.emotion_gesture.chunks import sample_emotion
 from a2g_jax.models.emotion_gesture.config import PRESETS
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder, standardised
 from a2g_jax.models.emotion_gesture.model import build
@@ -204,15 +204,6 @@ def test_beat_features_hold_nothing_that_is_constant_in_a_clip():
     np.testing.assert_allclose(moved, standardised(features), atol=1e-4)
     np.testing.assert_allclose(jnp.mean(moved, axis=1), 0.0, atol=1e-5)
     np.testing.assert_allclose(standardised(jnp.ones((1, 5, 2))), 0.0)
-
-
-def test_seams_have_no_step_of_place_or_speed():
-    offsets = jnp.asarray([[0.5], [0.8]])
-    joined = np.concatenate([offsets[-1:], seam(offsets, 10, 20)])[:, 0]
-    assert abs(joined[1] - joined[0] - 0.3) < 0.1
-    assert np.abs(np.diff(joined, n=2)).max() < 0.15
-    np.testing.assert_array_equal(joined[11:], 0.0)
-    assert not np.any(seam(offsets, 0, 20))
 
 
 def test_positions_are_those_of_the_formula():

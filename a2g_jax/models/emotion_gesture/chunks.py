@@ -114,14 +114,18 @@ def _chunk(
         sampled = sample_emotion(networks, params, key, sampling.temperature, jnp.nan_to_num(weights[0]))
         of_audio = jnp.isnan(weights).any(axis=-1, keepdims=True)
         features = features._replace(emotion=jnp.where(of_audio, features.emotion, sampled[None]))
-    made = networks.decode(params, features, seed[None], labels)[0]
-    before, new = made[: config.seed_frames], made[config.seed_frames :]
-    new = new + seam(seed - before, sampling.seam_frames, config.stride)
+    new = networks.decode(params, features, seed[None], labels)[0, config.seed_frames :]
+    if sampling.seam_frames > 0:
+        new = new + seam(seed, new, sampling.seam_frames)
     return networks.flat(space.valid(networks.pose(new[None])))[0]
 
 
 def sample_emotion(
-    networks: Networks, params: Params, key: Key[Array, ""], temperature: float, weights: Float[Array, "N E"]
+    networks: Networks,
+    params: Params,
+    key: Key[Array, ""],
+    temperature: float | Float[Array, ""],
+    weights: Float[Array, "N E"],
 ) -> Float[Array, "N D"]:
     """Emotion features of one random latent: those of each emotion, mixed by its weight at each frame."""
     classes = networks.classes
@@ -131,17 +135,21 @@ def sample_emotion(
     return jnp.einsum("ne,end->nd", weights, each)
 
 
-def seam(offsets: Float[Array, "M C"], frames: int, stride: int) -> Float[Array, "S C"]:
-    """What joins a chunk to the poses before it, without a step of place or speed: it fades out over some frames.
+def seam(seed: Float[Array, "M C"], new: Float[Array, "S C"], frames: int) -> Float[Array, "S C"]:
+    """What joins a chunk to the poses before it without a step of place or speed: it fades out over some frames.
+
+    With it the speed changes evenly from that of the last poses to the chunk's own: its first pose is one step of their
+    mean after the last one before it. A decoder's output may jump there, or stop for a frame, even where it
+    agrees with the initial poses.
 
     Args:
-        offsets: of the poses before the chunk from its own initial poses.
-        frames: how many; 0 for no join.
+        seed: the poses before the chunk.
+        new: the chunk's own.
+        frames: how many, 1 or more.
     """
-    if frames == 0:
-        return jnp.zeros((stride, offsets.shape[1]), offsets.dtype)
-    # Hermite's cubic from the last offset and its speed to zero and rest.
-    span = frames + 1.0
-    place = jnp.minimum((jnp.arange(stride)[:, None] + 1.0) / span, 1.0)
+    before, after = seed[-1:] - seed[-2:-1], new[1:2] - new[:1]
+    gap = seed[-1:] + 0.5 * (before + after) - new[:1]
+    # Hermite's cubic from the gap, and the speed that is missing, to zero and rest.
+    place = jnp.minimum(jnp.arange(len(new))[:, None] / frames, 1.0)
     rest = jnp.square(1.0 - place)
-    return rest * (1.0 + 2.0 * place) * offsets[-1:] + rest * place * span * (offsets[-1:] - offsets[-2:-1])
+    return rest * (1.0 + 2.0 * place) * gap + rest * place * frames * 0.5 * (before - after)
