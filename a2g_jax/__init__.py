@@ -9,6 +9,7 @@ __version__ = "0.2.0"
 # names for editors and type checkers.
 _EXPORTS = {
     "Corpus": "a2g_jax.data.corpus",
+    "EmotionSpace": "a2g_jax.generation.emotion_gesture.emotion_space",
     "Figure": "a2g_jax.viz.player.figure",
     "FlowSpace": "a2g_jax.generation.stylized_flow.latent_space",
     "Generator": "a2g_jax.generation.generator",
@@ -40,6 +41,7 @@ _EXPORTS = {
     "read_motion_npz": "a2g_jax.io.npz",
     "resample_motion": "a2g_jax.talker.recordings",
     "retarget": "a2g_jax.geometry.retarget.transfer",
+    "show_page": "a2g_jax.viz.player.inline",
     "talk": "a2g_jax.talker.recordings",
     "train": "a2g_jax.training.loop",
     "write_audio": "a2g_jax.io.audio",

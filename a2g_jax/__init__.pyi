@@ -5,6 +5,7 @@ from a2g_jax.evaluation.evaluate import evaluate as evaluate
 from a2g_jax.features.mel import log_mel as log_mel
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace as LatentSpace
 from a2g_jax.generation.controls import control_rows as control_rows
+from a2g_jax.generation.emotion_gesture.emotion_space import EmotionSpace as EmotionSpace
 from a2g_jax.generation.export import export as export
 from a2g_jax.generation.generator import Generator as Generator
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace
@@ -35,6 +36,7 @@ from a2g_jax.training.run import open_run as open_run
 from a2g_jax.training.run_config import Run as Run
 from a2g_jax.training.run_config import RunConfig as RunConfig
 from a2g_jax.viz.player.figure import Figure as Figure
+from a2g_jax.viz.player.inline import show_page as show_page
 from a2g_jax.viz.player.page import write_page as write_page
 
 __version__: str

@@ -87,12 +87,12 @@ def test_compare_refuses_training_and_what_is_no_run(tmp_path, capsys):
 
 
 def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path, capsys):
-    """The flow has no handedness; its motions stay as they are, and that is reported."""
+    """The flow has no handedness, EmotionGesture no control at all; their motions stay as they are, as reported."""
     taken = {}
 
     class Still(Generator):
         def __init__(self, run):
-            taken[run.config.model] = run.config.sampling_settings.controls
+            taken[run.config.model] = getattr(run.config.sampling_settings, "controls", None)
             self.run = run
 
         def stream(self, audio, samples, seed=0, **given):
@@ -102,12 +102,17 @@ def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path,
     flags = ["--samples", "1", "--formats", "npz", "--out", str(tmp_path / "out")]
     requests = ["--control", "handedness=0.9", "--control", "height=0.8"]
     assert main(["demo", "--compare", *requests, *flags]) == 0
-    assert taken == {"audio2gestures": ("handedness=0.9", "height=0.8"), "stylized_flow": ("height=0.8",)}
+    assert taken == {
+        "audio2gestures": ("handedness=0.9", "height=0.8"),
+        "stylized_flow": ("height=0.8",),
+        "emotion_gesture": None,
+    }
     printed = capsys.readouterr().out
-    assert "demo-flow: has no control for handedness=0.9" in printed
+    assert "demo-flow: has no control for handedness=0.9\n" in printed
+    assert "demo-emotion: has no control for handedness=0.9, height=0.8" in printed
     assert "demo: checked: " in printed
     assert main(["demo", "--compare", "--control", "tail=0.9", *flags]) == 2
-    assert "none of demo, demo-flow has a control 'tail'" in capsys.readouterr().err
+    assert f"none of {', '.join(SHIPPED)} has a control 'tail'" in capsys.readouterr().err
     assert main(["demo", "--compare", "--control", "emotion=envy", *flags]) == 2
     assert "demo: --control 'emotion=envy'" in capsys.readouterr().err
 

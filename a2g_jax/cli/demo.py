@@ -14,8 +14,10 @@ from a2g_jax.errors import InputError
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
 #: Minutes of generated recordings that ``--train`` trains on.
 DEMO_MINUTES = 20.0
-#: Motions of each system with ``--compare``.
-COMPARED_SAMPLES = 2
+#: Motions of each system with ``--compare``, and of each emotion with ``--emotions``.
+COMPARED_SAMPLES, EMOTION_SAMPLES = 2, 1
+#: The run of ``--emotions``.
+EMOTION_RUN = "demo-emotion"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,13 +33,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " runs",
     )
     parser.add_argument(
+        "--emotions",
+        nargs="?",
+        const=EMOTION_RUN,
+        metavar="RUN",
+        help=f"one motion for each emotion on one page, of {EMOTION_RUN} or another run with emotions",
+    )
+    parser.add_argument(
         "--out",
         metavar="DIR",
         help="folder to write to; files of an earlier call in it are replaced (default: demo; with --compare"
-        " comparison)",
+        " comparison, with --emotions emotions)",
     )
     sampling.add_arguments(
-        parser, None, f"default: {sampling.SAMPLES}; with --compare {COMPARED_SAMPLES} of each system"
+        parser,
+        None,
+        f"default: {sampling.SAMPLES}; with --compare {COMPARED_SAMPLES} of each system, with --emotions"
+        f" {EMOTION_SAMPLES} of each",
     )
 
 
@@ -48,12 +60,28 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         InputError: audio, a run or a folder that cannot be used, or flags that exclude each other.
     """
     existing_file(options.audio)
-    comparing = options.compare is not None
-    if comparing and options.train:
-        raise InputError("--train and --compare exclude each other; train first, then name the run: --compare RUN.")
-    options.out = options.out or ("comparison" if comparing else "demo")
-    options.samples = options.samples or (COMPARED_SAMPLES if comparing else sampling.SAMPLES)
-    (_compare if comparing else _demo)(options)
+    chosen = [flag for flag, on in _modes(options).items() if on]
+    if len(chosen) > 1:
+        raise InputError(
+            f"{' and '.join(chosen)} exclude each other; to see a run of your own, train it first and name it:"
+            " --compare RUN."
+        )
+    page, samples, command = {
+        "--compare": ("comparison", COMPARED_SAMPLES, _compare),
+        "--emotions": ("emotions", EMOTION_SAMPLES, _emotions),
+    }.get("".join(chosen), ("demo", sampling.SAMPLES, _demo))
+    options.out = options.out or page
+    options.samples = options.samples or samples
+    command(options)
+
+
+def _modes(options: argparse.Namespace) -> dict[str, bool]:
+    """Whether each flag is given of those of which one page can have only one."""
+    return {
+        "--train": options.train,
+        "--compare": options.compare is not None,
+        "--emotions": options.emotions is not None,
+    }
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -87,15 +115,30 @@ def _compare(options: argparse.Namespace) -> None:
     for name in options.compare:
         existing_run(name)
 
+    from a2g_jax.generation.comparison import systems
+
+    _side_by_side(options, systems(options.compare), "system")
+
+
+def _emotions(options: argparse.Namespace) -> None:
+    """Motions of all emotions on one page."""
+    existing_run(options.emotions)
+
+    from a2g_jax.generation.comparison import emotions
+
+    _side_by_side(options, emotions(options.emotions), "emotion")
+
+
+def _side_by_side(options: argparse.Namespace, runs: dict[str, Any], kind: str) -> None:
+    """One page of several runs."""
     from a2g_jax.compilations import keep_compilations
-    from a2g_jax.generation.comparison import Speech, compare, demo_speech_with_truth, systems
+    from a2g_jax.generation.comparison import Speech, compare, demo_speech_with_truth
     from a2g_jax.progress import progress_bar
 
     keep_compilations()
     speech = demo_speech_with_truth()
     if options.audio is not None:
         speech = Speech(Path(options.audio).name, read_speech(options.audio, options.channel).at)
-    runs = systems(options.compare)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
         compared = compare(
             runs,
@@ -106,6 +149,7 @@ def _compare(options: argparse.Namespace) -> None:
             formats=options.formats,
             controls=options.control or (),
             strict=options.strict,
+            kind=kind,
             report=lambda: bar.update(),
         )
     sampling.print_written(options.out, compared.written)

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "runs",
         nargs="*",
         metavar="RUN",
-        help="run folders, demo or demo-flow, or runs of emotion_classifier; none: baselines only",
+        help="run folders, demo, demo-flow or demo-emotion, or runs of emotion_classifier; none: baselines only",
     )
     parser.add_argument("--corpus", metavar="CORPUS", help="made by 'a2g prepare'")
     parser.add_argument(

@@ -22,7 +22,9 @@ TAKES_SETTINGS = True
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g generate``; those of settings are read later, since they depend on the run."""
     parser.add_argument(
-        "run", metavar="RUN", help="a run folder, or 'demo' or 'demo-flow' for those that are shipped with the package"
+        "run",
+        metavar="RUN",
+        help="a run folder, or one that is shipped with the package: 'demo', 'demo-flow' or 'demo-emotion'",
     )
     parser.add_argument(
         "--audio", metavar="FILE", help="speech, in any common format; M4A, AAC, MP4, WebM, WMA and AMR need ffmpeg"

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "path",
         metavar="FILE|FOLDER|CORPUS|RUN",
         help="BVH, audio, TextGrid or other transcript, NPZ; WAV and BVH pairs; made by 'a2g prepare' or 'a2g train';"
-        " demo or demo-flow",
+        " demo, demo-flow or demo-emotion",
     )
     parser.add_argument("--audio", metavar="FILE", help="the speech that belongs to a motion or a transcript")
     parser.add_argument(

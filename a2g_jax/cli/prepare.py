@@ -34,7 +34,10 @@ DESCRIPTION = "Make a corpus from recordings, or generate one. Interruptible: th
 #: The generated corpus, and the data sets of this package.
 READERS = ("talker", *NAMES)
 #: Flags that only generated corpora have, and those that only recorded ones have.
-_GENERATED = ("minutes", "speakers", "emotions", "languages", "jitter", "fingers", "view", "on_demand")
+_GENERATED = (
+    *("minutes", "speakers", "emotions", "languages", "equal_emotions"),
+    *("jitter", "fingers", "view", "on_demand"),
+)
 _RECORDED = (
     *("source", "joints", "random_split", "skip_broken", "limit", "labels", "confidence", "labelled", "for_run"),
     *("channel", "tier", "smooth"),
@@ -95,7 +98,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="for_run",
         metavar="RUN",
-        help="rate, mel bands, poses and body of a run, for 'a2g train --from RUN': a run folder, demo or demo-flow",
+        help="rate, mel bands, poses and body of a run, for 'a2g train --from RUN': a run folder, demo, demo-flow or"
+        " demo-emotion",
     )
     recorded.add_argument("--random-split", action="store_true", help="split by the seed, not as the authors did")
     recorded.add_argument("--skip-broken", action="store_true", help="leave out recordings that cannot be read")
@@ -114,6 +118,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     generated.add_argument("--minutes", type=positive, help="minutes of talk to generate (default: 30)")
     generated.add_argument("--speakers", metavar="NAMES", help="speakers, comma-separated (default: all)")
     generated.add_argument("--emotions", metavar="NAMES", help="emotions, comma-separated (default: all)")
+    generated.add_argument(
+        "--equal-emotions",
+        action="store_true",
+        help="emotions in equal shares; by default half of the recordings are neutral",
+    )
     generated.add_argument(
         "--languages",
         metavar="NAMES",
@@ -204,6 +213,7 @@ def _talker_options(options: argparse.Namespace, view: str) -> "TalkerOptions":
         speakers=speakers,
         emotions=emotions,
         languages=languages,
+        equal_emotions=options.equal_emotions,
         jitter=options.jitter or 0.0,
         fingers=options.fingers,
         view=view,

@@ -34,8 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--from",
         dest="source",
         metavar="RUN",
-        help="start from the weights of a run (a folder, or demo or demo-flow), with its settings, to adapt it to one"
-        " to ten minutes of a person's recordings; prepare these with 'a2g prepare ... --for RUN'",
+        help="start from the weights of a run (a folder, or demo, demo-flow or demo-emotion), with its settings, to"
+        " adapt it to one to ten minutes of a person's recordings; prepare these with 'a2g prepare ... --for RUN'",
     )
     parser.add_argument(
         "--features", metavar="RUN", help="a run of motion_autoencoder, or 'demo', for models with a perceptual loss"

@@ -42,6 +42,8 @@ class TalkerOptions:
     """Data set whose format the recordings have: see :data:`~a2g_jax.talker.views.catalogue.VIEWS`."""
     languages: tuple[str, ...] = ()
     """Some of :data:`~a2g_jax.talker.languages.LANGUAGE_NAMES`, in equal shares; empty for the invented one."""
+    equal_emotions: bool = False
+    """Emotions in equal shares; otherwise half of the recordings are neutral, as in BEAT."""
 
     def __post_init__(self) -> None:
         find_view(self.view)
@@ -70,8 +72,10 @@ class TalkerOptions:
             "speakers": list(self.speakers or SPEAKERS),
             "emotions": list(self.emotions or VOICE_EMOTIONS),
         }
-        # Recipes without languages are those of versions that had none.
+        # Recipes without languages and equal shares are those of versions that had none.
         del recipe["languages"]
+        if not self.equal_emotions:
+            del recipe["equal_emotions"]
         if self.languages:
             recipe["languages"] = list(self.languages)
         if set(self.languages) - {INVENTED}:
@@ -80,7 +84,7 @@ class TalkerOptions:
 
     def roles(self) -> list[Role]:
         """Arguments of each recording."""
-        return cast(self.minutes, self.seed, self.speakers, self.emotions, self.languages)
+        return cast(self.minutes, self.seed, self.speakers, self.emotions, self.languages, self.equal_emotions)
 
 
 def check_synthesizer(recipe: dict[str, Any], path: Any) -> None:

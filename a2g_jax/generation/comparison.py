@@ -1,9 +1,12 @@
-"""Systems side by side: motions of several runs for one speech, beside the talker's own motion where there is one."""
+"""Runs side by side: motions of several systems, or of one with several emotions, for one speech.
+
+The talker's own motion stands beside them where there is one.
+"""
 
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +84,23 @@ def systems(others: Sequence[str] = ()) -> dict[str, Run]:
     return found
 
 
+def emotions(name: str) -> dict[str, Run]:
+    """A run with each emotion of its corpus as its setting, by emotion; neutral first.
+
+    Args:
+        name: folder of a run, or name of a shipped one.
+
+    Raises:
+        InputError: not a run, or one without the setting.
+    """
+    run = open_run(name)
+    _ = run.config.skeleton
+    names = sorted(run.config.corpus.get("emotions", ()), key=lambda emotion: (emotion != "neutral", emotion))
+    if not names or not hasattr(run.config.sampling, "emotion"):
+        raise InputError(f"{name}: a run of {run.config.model} has no setting --emotion; name one that has.")
+    return {each: replace(run, config=run.config.with_sampling(emotion=each)) for each in names}
+
+
 def _animates(run: Run) -> bool:
     return run.config.space.has_rotations and run.config.build().sample is not None
 
@@ -105,6 +125,7 @@ def compare(
     formats: Sequence[str],
     controls: Sequence[str] = (),
     strict: bool = False,
+    kind: str = "system",
     report: Callable[[], None] = lambda: None,
 ) -> Compared:
     """Write the motions of every run for a speech, one page of them all, and ``checks.json``.
@@ -119,6 +140,7 @@ def compare(
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         controls: requests such as ``energy=0.9``, for the runs that have the control.
         strict: whether a motion that stays outside the bounds of a body is an error.
+        kind: what each run is, for the heading.
         report: called after each motion of a run.
 
     Raises:
@@ -157,7 +179,7 @@ def compare(
             figures,
             audio[first.mel.sample_rate],
             first.mel.sample_rate,
-            title=f"{_count(len(runs))} for {speech.title}",
+            title=f"{_count(len(runs), kind)} for {speech.title}",
             subtitle=_subtitle(speech, samples, seed) + (f"; {', '.join(controls)}" if controls else ""),
             words=speech.words,
         )
@@ -199,9 +221,9 @@ def _note(run: Run, without: Sequence[str]) -> str:
     return f"{run.config.model}, without {', '.join(without)}" if without else run.config.model
 
 
-def _count(runs: int) -> str:
-    words = ("No systems", "One system", "Two systems", "Three systems", "Four systems", "Five systems")
-    return words[runs] if runs < len(words) else f"{runs} systems"
+def _count(runs: int, kind: str) -> str:
+    words = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight")
+    return f"{words[runs] if runs < len(words) else runs} {kind}{'' if runs == 1 else 's'}"
 
 
 def _subtitle(speech: Speech, samples: int, seed: int) -> str:

@@ -28,6 +28,7 @@ def continue_clips(
     last: int,
     samples: int,
     seed: int = 0,
+    emotion: Float[np.ndarray, "N T E"] | None = None,
 ) -> Float[np.ndarray, "N samples frames R D"]:
     """Frames ``first`` to ``last - 1`` of clips, ``samples`` times each.
 
@@ -39,6 +40,7 @@ def continue_clips(
         pose: seed poses are the last ones before ``first``, for models that take seed poses.
         first: number of the first frame that is generated; at least the model's number of seed poses.
         last: number of the frame after the last one; for autoregressive models, at most T less their lookahead.
+        emotion: weights of the run's emotions, for models that are conditioned on them.
 
     Raises:
         ValueError: seed poses or lookahead outside of the clip.
@@ -55,7 +57,8 @@ def continue_clips(
     for start in range(0, len(audio), _CHUNK):
         # The last chunk is filled up, so that one compiled program serves all.
         rows = np.minimum(np.arange(start, start + _CHUNK), len(audio) - 1)
-        poses = draw(params, summary, keys[rows], normalised[rows], pose[rows])
+        labels = None if emotion is None else emotion[rows]
+        poses = draw(params, summary, keys[rows], normalised[rows], pose[rows], labels)
         made.append(np.asarray(poses)[: len(audio) - start])
     return np.concatenate(made)
 
@@ -79,10 +82,10 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
     assert begin is not None
     assert proceed is not None
 
-    def draw(params, summary, keys, audio, pose):
-        def one_clip(keys, audio, pose):
+    def draw(params, summary, keys, audio, pose, emotion):
+        def one_clip(keys, audio, pose, emotion):
             stop = last + model.overlap
-            whole = condition(params, summary, Condition(audio, controls=controls))
+            whole = condition(params, summary, Condition(audio, emotion=emotion, controls=controls))
             given = jax.tree.map(lambda array: array[first:stop], whole)
             # Without the summary, whose limits of poses are for generation of minutes.
             seeds = pose[first - history : first]
@@ -93,7 +96,7 @@ def _autoregressive(run: Run, model: Model, first: int, last: int, frames: int) 
 
             return space.valid(jax.vmap(one)(keys))
 
-        return jax.vmap(one_clip)(keys, audio, pose)
+        return jax.vmap(one_clip)(keys, audio, pose, emotion)
 
     return draw
 
@@ -107,15 +110,17 @@ def _whole(run: Run, model: Model, first: int, last: int, frames: int) -> Any:
     assert condition is not None
     assert sample is not None
 
-    def draw(params, summary, keys, audio, pose):
+    def draw(params, summary, keys, audio, pose, emotion):
         del pose
         # Noise is drawn in blocks; after a clip the audio is as quiet as its quietest frame.
-        padded = jnp.pad(audio, ((0, 0), (0, -audio.shape[1] % BLOCK), (0, 0)), mode="minimum")
+        filled = ((0, 0), (0, -audio.shape[1] % BLOCK), (0, 0))
+        padded = jnp.pad(audio, filled, mode="minimum")
+        emotion = None if emotion is None else jnp.pad(emotion, filled, mode="edge")
 
-        def one_clip(keys, audio):
-            given = condition(params, summary, Condition(audio, controls=controls))
+        def one_clip(keys, audio, emotion):
+            given = condition(params, summary, Condition(audio, emotion=emotion, controls=controls))
             return jax.vmap(lambda key: sample(params, summary, key, given, jnp.int32(0))[first:last])(keys)
 
-        return space.valid(jax.vmap(one_clip)(keys, padded))
+        return space.valid(jax.vmap(one_clip)(keys, padded, emotion))
 
     return draw

@@ -24,8 +24,8 @@ def inspect(
     """Facts about a file, a folder of recordings, a corpus or a run, and its likely faults.
 
     Args:
-        name: path of the file or folder, or the name of a run that comes with the package: ``"demo"`` or
-            ``"demo-flow"``. ``"./demo"`` is a folder of that name.
+        name: path of the file or folder, or the name of a run that comes with the package: ``"demo"``,
+            ``"demo-flow"`` or ``"demo-emotion"``. ``"./demo"`` is a folder of that name.
         audio: the speech that belongs to a motion or a transcript.
         channel: of audio files, from 1 on; None for the mean of all.
         tier: of TextGrids, its name or the speaker's; None for the first one of words.

@@ -57,11 +57,13 @@ class SEResNet(nn.Module):
 
     blocks: Sequence[int]
     channels: Sequence[int]
+    stem: int = 1
+    """Stride of the first convolution."""
 
     @nn.compact
     def __call__(self, x: Float[Array, "B T F"]) -> Float[Array, "B T2 F2 C"]:
         first = self.channels[0]
-        y = group_norm(first)(nn.relu(convolution(first)(x[..., None])))
+        y = group_norm(first)(nn.relu(convolution(first, stride=self.stem)(x[..., None])))
         for stage, (count, channels) in enumerate(zip(self.blocks, self.channels, strict=True)):
             for block in range(count):
                 y = SEBlock(channels, 2 if stage > 0 and block == 0 else 1)(y)

@@ -25,7 +25,9 @@ from a2g_jax.talker.voice import synthesise
 #: Length of one recording of a corpus, seconds.
 RECORDING_SECONDS = 60.0
 # Streams of a recording's seed; new uses get new numbers, so that old seeds keep their meaning.
-_SPEECH, _VOICE, _MOTION, _CAST, _ROOM, _LANGUAGE = range(6)
+_SPEECH, _VOICE, _MOTION, _CAST, _ROOM, _LANGUAGE, _EMOTION = range(7)
+#: Fields of recordings that take turns.
+_TURNS = {"emotion": _EMOTION, "language": _LANGUAGE}
 
 
 def talk(
@@ -124,12 +126,14 @@ def cast(
     speakers: tuple[str, ...] = (),
     emotions: tuple[str, ...] = (),
     languages: tuple[str, ...] = (),
+    equal_emotions: bool = False,
 ) -> list[dict[str, Any]]:
     """Speakers, emotions and seeds of a corpus: arguments of :func:`talk` for each recording, about a minute each.
 
     Speakers take turns in a shuffled order; emotions are drawn, neutral half of the time. Every other recording has
     the sound of a room, so that models trained on the corpus are not limited to studio recordings. Languages, if any
     are named, take turns in an order shuffled anew each round; speakers, emotions and seeds do not depend on them.
+    With ``equal_emotions`` emotions take turns in the same way, and speakers and seeds are those without it.
     """
     speakers, emotions = speakers or tuple(SPEAKERS), emotions or tuple(VOICE_EMOTIONS)
     total = minutes * 60.0
@@ -152,9 +156,11 @@ def cast(
                 "room": index % 2 == 1,
             }
         )
-    if languages:
-        rng = np.random.default_rng([seed, _CAST, _LANGUAGE])
-        rounds = [rng.permutation(len(languages)) for _ in range(0, count, len(languages))]
-        for role, index in zip(roles, np.concatenate(rounds), strict=False):
-            role["language"] = languages[index]
+    turns = {"emotion": emotions if equal_emotions else (), "language": languages}
+    for field, names in turns.items():
+        if names:
+            rng = np.random.default_rng([seed, _CAST, _TURNS[field]])
+            rounds = [rng.permutation(len(names)) for _ in range(0, count, len(names))]
+            for role, index in zip(roles, np.concatenate(rounds), strict=False):
+                role[field] = names[index]
     return roles

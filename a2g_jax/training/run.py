@@ -140,7 +140,8 @@ def demo_run() -> Run:
 
 
 def open_run(name: str | os.PathLike[str]) -> Run:
-    """A run folder, or one of those that are shipped with the package: ``demo`` and ``demo-flow``.
+    """A run folder, or one of those that are shipped with the package: ``demo``, ``demo-flow`` and
+    ``demo-emotion``.
 
     Raises:
         InputError: not a run, nothing trained yet, or damaged or mismatching files.

@@ -17,7 +17,7 @@ RUN_FILE = "run.json"
 WEIGHTS_FILE = "weights.safetensors"
 
 #: Folders of the package by the names of the runs that are shipped with it.
-SHIPPED = {"demo": "demo", "demo-flow": "demo_flow"}
+SHIPPED = {"demo": "demo", "demo-flow": "demo_flow", "demo-emotion": "demo_emotion"}
 #: The same of the shipped feature network.
 SHIPPED_FEATURES = {"demo": "demo_features"}
 

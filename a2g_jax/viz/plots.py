@@ -14,19 +14,20 @@ from a2g_jax.geometry.skeleton import BODY_JOINTS
 COLOURS = ("#9aa5b4", "#2f6fde", "#d9822b", "#2a9d63")
 
 
-def film_strip(axes: Any, motions: Sequence[Motion], moments: int = 8) -> None:
+def film_strip(axes: Any, motions: Sequence[Motion], moments: int = 8, colours: Sequence[Any] = COLOURS) -> None:
     """Draw stick figures from the front at evenly spaced moments, the motions over each other.
 
     Args:
         axes: Matplotlib axes.
         motions: motions of the same length; the first is drawn pale.
         moments: number of moments.
+        colours: of the motions, in turn.
     """
     frames = min(motion.frames for motion in motions)
     for number, motion in enumerate(motions):
         positions = motion.positions()
         positions = positions - positions[:, :1]
-        colour = COLOURS[number % len(COLOURS)]
+        colour = colours[number % len(colours)]
         for moment, frame in enumerate(np.linspace(0, frames - 1, moments).round().astype(int)):
             x, y = positions[frame, :, 0] + 1.1 * moment, positions[frame, :, 1]
             for joint, parent in enumerate(motion.skeleton.parents):

@@ -16,7 +16,7 @@ _OF_DENSITY = ("bits_per_dim",)
 
 def over_seeds(table: str, variant: str, metric: str) -> tuple[float, float, int] | None:
     """Mean over seeds of a score, half the width of its 95 % interval (Student's t), and the number of seeds."""
-    return _interval([r["scores"][metric]["mean"] for r in current(table) if _has(r, variant, metric)])
+    return interval([r["scores"][metric]["mean"] for r in current(table) if _has(r, variant, metric)])
 
 
 def best_over_seeds(table: str, variant: str, metric: str) -> float | None:
@@ -30,7 +30,8 @@ def _has(record: Mapping[str, Any], variant: str, metric: str) -> bool:
     return record["variant"] == variant and metric in record["scores"]
 
 
-def _interval(values: Sequence[float]) -> tuple[float, float, int] | None:
+def interval(values: Sequence[float]) -> tuple[float, float, int] | None:
+    """Mean, half the width of its 95 % interval (Student's t; NaN for one value), and the number of values."""
     from scipy.stats import t
 
     if not values:
@@ -49,7 +50,7 @@ def difference(table: str, first: str, second: str, metric: str) -> tuple[float,
         for name in (first, second):
             if _has(record, name, metric):
                 by_seed.setdefault(record["seed"], {})[name] = record["scores"][metric]["mean"]
-    return _interval([pair[first] - pair[second] for pair in by_seed.values() if len(pair) == 2])
+    return interval([pair[first] - pair[second] for pair in by_seed.values() if len(pair) == 2])
 
 
 @dataclass(frozen=True)

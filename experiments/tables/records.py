@@ -15,12 +15,12 @@ from typing import Any
 from a2g_jax.data.corpus import Corpus
 
 #: Fields that the records of one table share, in addition to the steps of trained ones.
-_MEASURED = ("corpus", "feature_network", "samples", "units", "split")
+_MEASURED = ("corpus", "feature_network", "emotion_classifier", "samples", "units", "split")
 
 EXPERIMENTS = Path(__file__).parents[1]
 
 #: Fields that identify a record of a table.
-_IDENTITY = ("variant", "seed", "corpus", "feature_network", "steps", "samples", "units", "split")
+_IDENTITY = ("variant", "seed", "steps", *_MEASURED)
 
 
 def name_of(corpus: Corpus) -> str:
@@ -36,7 +36,12 @@ def name_of(corpus: Corpus) -> str:
 
 
 #: Fields of a recipe that determine the recordings.
-_RECIPE = frozenset({"minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"})
+_RECIPE = frozenset(
+    {
+        *("minutes", "seed", "fps", "speakers", "emotions", "jitter", "fingers", "view"),
+        *("equal_emotions", "languages", "synthesizer"),
+    }
+)
 
 
 def results(paper: str) -> Path:

@@ -11,10 +11,11 @@ from typing import Any
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
+from a2g_jax.evaluation.emotion_judge import EmotionJudge, load_emotion_judge
 from a2g_jax.evaluation.evaluate import evaluate
 from a2g_jax.evaluation.feature_network import FeatureNetwork, load_feature_network
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.units import OURS, Units, find_units
+from a2g_jax.metrics.units import OURS, UNITS, Units
 from a2g_jax.models import find_model
 from a2g_jax.models.train_config import TRAIN_PRESETS
 from a2g_jax.training.loop import train
@@ -49,6 +50,8 @@ class Ruler:
     samples: int
     units: Units = OURS
     split: str = "test"
+    judge: EmotionJudge | None = None
+    """For emotion accuracy."""
 
 
 #: ``score(name, run, ruler, seed) -> fields of a record in addition to its conditions``: "scores", and others.
@@ -96,6 +99,8 @@ class Setting:
     """The network of perceptual losses, which is not the one that scores."""
     split: str = "test"
     """The split that is scored."""
+    judge: Path | None = None
+    """A classifier of emotions in motion; without one there is no emotion accuracy."""
 
 
 def arguments(description: str, steps: int = 1000, seeds: str = "0,1,2") -> argparse.ArgumentParser:
@@ -228,14 +233,17 @@ def measure(table: str, where: Setting) -> tuple[Ruler, dict[str, Any]]:
         "units": units_of(table).key,
         "split": where.split,
     }
-    ruler = Ruler(corpus, network, where.samples, units_of(table), where.split)
+    judge = None if where.judge is None else load_emotion_judge(where.judge, corpus)
+    if judge is not None:
+        measured["emotion_classifier"] = judge.fingerprint[:16]
+    ruler = Ruler(corpus, network, where.samples, units_of(table), where.split, judge)
     check_networks(where, ruler)
     return ruler, measured
 
 
 def units_of(table: str) -> Units:
-    """The units of a table's paper, so that its figures can be compared with ours."""
-    return find_units(table.split("/")[0].replace("_", "-"))
+    """The units of a table's paper, so that its figures can be compared with ours; ours where it has none."""
+    return UNITS.get(table.split("/")[0].replace("_", "-"), OURS)
 
 
 def check_networks(where: Setting, ruler: Ruler) -> None:
@@ -334,6 +342,12 @@ def trained(config: RunConfig, variant: Variant, corpus: Corpus, where: Setting)
     if variant.generation:
         run = replace(run, config=run.config.with_sampling(**variant.generation))
     return run, seconds, computing
+
+
+def folder_of(name: str, variants: Mapping[str, Variant], seed: int, corpus: Corpus, where: Setting) -> Path:
+    """Folder of the run of a row of a table."""
+    _, config = described(name, variants[name], variants, seed, corpus, where)
+    return where.runs / _digest(config, corpus, None)
 
 
 def _line(record: Mapping[str, Any]) -> str:

@@ -33,7 +33,9 @@ CONFIG = replace(
     discriminator_hidden=(6,),
     vae_latent=3,
     vae_channels=4,
+    mining_steps=5,
     vae_steps=8,
+    sampled_steps=6,
 )
 BANDS, SPECTRA, JOINTS = 6, 2, 3
 EMOTIONS = ("anger", "happiness", "neutral")
@@ -50,6 +52,11 @@ def make_data(joints=JOINTS, emotions=EMOTIONS, bands=BANDS, spectra=SPECTRA):
     offsets = random.normal(scale=0.3, size=(joints, 3)).astype(np.float32)
     body = Skeleton(offsets, names, tuple(range(-1, joints - 1)))
     return Data(PoseSpace(body, "6d"), 15.0, bands * spectra, statistics, emotions, spectra=spectra)
+
+
+def stage(model, name):
+    """The stage of a model with a name."""
+    return next(each for each in model.stages if each.name == name)
 
 
 def make_batch(clips=3, frames=CONFIG.clip_frames, dtype=np.float32, seed=2):

@@ -9,9 +9,9 @@ import pytest
 from audio2gestures_for_tests import BANDS, CONFIG, DATA, MAPPING, make_params
 
 from a2g_jax.data.batch import Batch
-from a2g_jax.models.audio2gestures.adversary import discriminator_input
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.model import build
+from a2g_jax.models.judged_motion import judged_motion
 
 SIZE = 8
 PLAIN = replace(
@@ -94,9 +94,9 @@ def test_terms(params):
 
 def test_the_discriminator_takes_the_motion_and_not_the_length_of_raw_vectors():
     pose = clips().pose
-    first = discriminator_input(CODEC, pose)
-    np.testing.assert_allclose(discriminator_input(CODEC, 2.0 * pose), first, atol=1e-4)
-    still = discriminator_input(CODEC, jnp.broadcast_to(pose[:, :1], pose.shape))
+    first = judged_motion(CODEC.data, pose)
+    np.testing.assert_allclose(judged_motion(CODEC.data, 2.0 * pose), first, atol=1e-4)
+    still = judged_motion(CODEC.data, jnp.broadcast_to(pose[:, :1], pose.shape))
     places = DATA.space.rows * 3
     np.testing.assert_allclose(still[..., places : 2 * places], 0.0, atol=1e-5)
     assert np.abs(np.asarray(first[..., places : 2 * places])).max() > 0.1

@@ -14,6 +14,7 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.generation.engine import Engine
 from a2g_jax.models.base import Condition
+from a2g_jax.models.emotion_gesture.chunks import seam
 from a2g_jax.models.emotion_gesture.model import build
 from a2g_jax.models.emotion_gesture.sampling import EmotionGestureSampling
 from a2g_jax.models.train_config import TrainConfig
@@ -72,10 +73,39 @@ def test_windows_of_any_size_agree(audio, emotion):
     np.testing.assert_allclose(small, large, atol=2e-5)
 
 
-@pytest.mark.parametrize("seam", [0, 5])
-def test_it_is_the_chunks_one_after_another(audio, seam):
+def continued(earlier, last, new, frames):
+    """The chunk plus the cubic polynomial of least degree that has the values and slopes of both ends."""
+    before, after = last - earlier, new[1] - new[0]
+    gap, slope = last + (before + after) / 2 - new[0], (before - after) / 2
+    # Coefficients of 1, t, t^2, t^3 from value and slope at 0 and at the last frame.
+    end = float(frames)
+    system = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [1, end, end**2, end**3], [0, 1, 2 * end, 3 * end**2]])
+    cubic = np.linalg.solve(system, np.stack([gap, slope, 0 * gap, 0 * gap]).reshape(4, -1))
+    powers = np.arange(frames)[:, None] ** np.arange(4)[None]
+    joined = new.copy()
+    joined[:frames] += (powers @ cubic).reshape(frames, *new.shape[1:])
+    return joined
+
+
+def test_a_seam_has_no_step_of_place_or_speed():
+    """A chunk that jumps away from the poses before it; and one that goes on as they do is left as it is."""
+    time = np.arange(40)[:, None] / 15.0
+    whole = jnp.asarray(np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1), jnp.float32)
+    seed, jumped = whole[:10], whole[10:] + 0.5
+    steps = lambda new: np.abs(np.diff(np.concatenate([seed, new]), 2, axis=0))  # noqa: E731
+    assert steps(jumped)[8:10].max() > 0.4
+    joined = jumped + seam(seed, jumped, 10)
+    assert steps(joined).max() < 0.05
+    np.testing.assert_allclose(joined[10:], jumped[10:], atol=1e-6)
+    assert np.abs(seam(seed, whole[10:], 10)).max() < 0.08
+    line = jnp.arange(12.0)[:, None]
+    np.testing.assert_allclose(seam(line[:4], line[4:], 5), 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("fading", [0, 5])
+def test_it_is_the_chunks_one_after_another(audio, fading):
     """The window loop against a loop over chunks: each is a clip that begins with the last poses before it."""
-    run = make_run(EmotionGestureSampling(seam_frames=seam))
+    run = make_run(EmotionGestureSampling(seam_frames=fading))
     seeds = np.random.default_rng(4).normal(size=(9, JOINTS, 6)).astype(np.float32)
     ours = rows(run, audio, seed_poses=seeds)[0]
     first, chunk = CHUNKS.seed_frames, CHUNKS.stride
@@ -88,10 +118,9 @@ def test_it_is_the_chunks_one_after_another(audio, seam):
         poses = np.concatenate([last, np.zeros((chunk, JOINTS, 6), np.float32)])
         batch = Batch(jnp.asarray(padded[start : start + CHUNKS.clip_frames][None]), jnp.asarray(poses[None]))
         found = statistics.normalise(np.asarray(reconstruct(run.params, batch))[0])
-        offset = statistics.normalise(last)[-1] - found[first - 1]
-        shares = np.array([max(0.0, 1.0 - (frame + 1) / (seam + 1)) for frame in range(chunk)])
-        shares = shares**2 * (3 - 2 * shares) if seam else 0 * shares
-        new = found[first:] + shares[:, None, None] * offset
+        seed, new = statistics.normalise(last), found[first:].copy()
+        if fading:
+            new = continued(seed[-2], seed[-1], new, fading)
         new = np.asarray(space.valid(jnp.asarray(statistics.denormalise(new), jnp.float32)))
         last = np.concatenate([last, new])[-first:]
         made.append(new)

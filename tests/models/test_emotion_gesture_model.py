@@ -6,13 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_batch, make_data, make_params
+from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_batch, make_data, make_params, stage
 
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Condition
 from a2g_jax.models.emotion_gesture.chunks import sample_emotion
 from a2g_jax.models.emotion_gesture.config import PRESETS
-from a2g_jax.models.emotion_gesture.mining import AudioEncoder
+from a2g_jax.models.emotion_gesture.mining import AudioEncoder, standardised
 from a2g_jax.models.emotion_gesture.model import build
 from a2g_jax.models.emotion_gesture.networks import Networks
 from a2g_jax.models.emotion_gesture.objective import generate, judged
@@ -24,6 +24,8 @@ from a2g_jax.nn.transformer import sinusoids
 from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import joint_loss
 
+#: Terms of the discriminator's side.
+JUDGED = ("discriminator", "recorded_emotion")
 VARIANTS = {
     "tiny": CONFIG,
     "authors": replace(CONFIG, header="channels", prompt_space="poses", emotion_pool="flat", scaled_scores=False),
@@ -106,7 +108,7 @@ def test_a_sample_does_not_depend_on_the_others_of_its_batch(name):
 @pytest.mark.parametrize("header", ["aligned", "channels"])
 @pytest.mark.parametrize("frames", [12, 15])
 def test_both_headers_give_a_row_a_frame(header, frames):
-    encoder = AudioEncoder((1, 1), (4, 6), 8, header, 2, 0.0)
+    encoder = AudioEncoder((1, 1), (4, 6), 1, 8, header, 2, 0.0)
     audio = jnp.asarray(np.random.default_rng(0).normal(size=(2, frames, 12)), jnp.float32)
     params = encoder.init(jax.random.key(0), audio, True)
     assert encoder.apply(params, audio, True).shape == (2, frames, 8)
@@ -119,7 +121,7 @@ def test_the_aligned_header_keeps_time():
     audio[1, 24] = 5.0
     changes = {}
     for header in ("aligned", "channels"):
-        encoder = AudioEncoder((1, 1), (4, 6), 8, header, 2, 0.0)
+        encoder = AudioEncoder((1, 1), (4, 6), 1, 8, header, 2, 0.0)
         params = encoder.init(jax.random.key(1), jnp.asarray(audio), True)
         silent, click = encoder.apply(params, jnp.asarray(audio), True)
         changes[header] = np.linalg.norm(click - silent, axis=-1)
@@ -178,7 +180,7 @@ def test_interpolated_time():
 
 @pytest.mark.parametrize("normalise", [True, False])
 def test_the_held_pose_fades_to_the_mean_pose(normalise):
-    """With a decoder of zeros the motion is the seed poses, and half of the last one's offset from the mean after."""
+    """With a decoder of zeros the motion is the seed poses, and half way to the mean pose after they came to rest."""
     config, data = replace(CONFIG, normalise_pose=normalise), make_data()
     networks = Networks(config, data)
     params = make_params(build(config, data))
@@ -189,8 +191,19 @@ def test_the_held_pose_fades_to_the_mean_pose(normalise):
     pose = networks.pose(generate(networks, {**params, "generator": generator}, batch)[1])[0]
     seed = batch.pose[0, : config.seed_frames]
     np.testing.assert_allclose(pose[: config.seed_frames], seed, atol=1e-5)
-    half = (seed[-1] + data.pose_statistics.mean) / 2
-    np.testing.assert_allclose(pose[config.seed_frames :], np.tile(half, (config.stride, 1, 1)), atol=1e-5)
+    place = seed[-1]
+    for frame in range(config.stride):
+        place = place + 0.6 ** (frame + 1) * (seed[-1] - seed[-2])
+        half = (place + data.pose_statistics.mean) / 2
+        np.testing.assert_allclose(pose[config.seed_frames + frame], half, atol=1e-5)
+
+
+def test_beat_features_hold_nothing_that_is_constant_in_a_clip():
+    features = jax.random.normal(jax.random.key(0), (2, 30, 4))
+    moved = standardised(3.0 * features + jnp.arange(4.0)[None, None])
+    np.testing.assert_allclose(moved, standardised(features), atol=1e-4)
+    np.testing.assert_allclose(jnp.mean(moved, axis=1), 0.0, atol=1e-5)
+    np.testing.assert_allclose(standardised(jnp.ones((1, 5, 2))), 0.0)
 
 
 def test_positions_are_those_of_the_formula():
@@ -206,6 +219,7 @@ class TestObjective:
     def sides(self):
         """Values and gradients of any weighting of the terms, in double precision."""
         config = replace(CONFIG, reconstruction_weight=2.0, smooth_weight=0.7, emotion_weight=0.4, beat_weight=0.6)
+        assert config.shown_emotion_weight == 1.0
         with jax.enable_x64(True):
             model = build(config, make_data())
             params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
@@ -215,11 +229,13 @@ class TestObjective:
             "emotion": 0.4,
             "beat": 0.6,
             "adversarial": 1.0,
+            "shown_emotion": 1.0,
             "discriminator": 1.0,
+            "recorded_emotion": 1.0,
         }
 
         def mixed(params, chosen):
-            total, terms = joint_loss(model.stages[0])(params, jax.random.key(0), batch, jnp.int32(0))
+            total, terms = joint_loss(stage(model, "main"))(params, jax.random.key(0), batch, jnp.int32(0))
             return chosen["total"] * total + sum(chosen[name] * terms[name] for name in weights)
 
         function = jax.jit(jax.value_and_grad(mixed))
@@ -229,10 +245,10 @@ class TestObjective:
     def test_each_side_moves_its_own_network(self, sides, x64):
         function, params, choose, weights = sides
         largest = lambda tree: max(np.abs(leaf).max() for leaf in jax.tree.leaves(tree))  # noqa: E731
-        game = function(params, choose("discriminator"))[1]
+        game = function(params, choose(*JUDGED))[1]
         assert largest(game["generator"]) == 0
         assert largest(game["discriminator"]) > 0
-        rest = function(params, choose(*[name for name in weights if name != "discriminator"]))[1]
+        rest = function(params, choose(*[name for name in weights if name not in JUDGED]))[1]
         assert largest(rest["discriminator"]) == 0
         assert largest(rest["vae"]) == largest(game["vae"]) == 0
 
@@ -285,7 +301,7 @@ class TestObjective:
             ahead, behind = (
                 function(
                     params | {network: jax.tree.map(lambda p, w, s=sign: p + s * step * w, params[network], way)},
-                    choose("adversarial"),
+                    choose("adversarial", "shown_emotion"),
                 )[0]
                 for sign in (1, -1)
             )
@@ -301,13 +317,14 @@ class TestObjective:
         networks, batch = Networks(config, make_data()), make_batch()
         params = make_params(build(config, make_data()))
         motion, label = networks.flat(batch.pose), jax.nn.one_hot(batch.emotion, 3)
-        logits = networks.judge(params, motion, batch.audio, label)
+        logits, emotions = networks.judge(params, motion, batch.audio, label)
         assert logits.shape == ((6,) if discriminator == "patches" else (3,))
         patches = discriminator == "patches"
+        assert (None if emotions is None else emotions.shape) == ((3, 3) if patches else None)
         changed = {
-            "audio": networks.judge(params, motion, -batch.audio, label),
-            "label": networks.judge(params, motion, batch.audio, jnp.roll(label, 1, axis=1)),
-            "first": networks.judge(params, motion.at[:, :2].multiply(2.0), batch.audio, label),
+            "audio": networks.judge(params, motion, -batch.audio, label)[0],
+            "label": networks.judge(params, motion, batch.audio, jnp.roll(label, 1, axis=1))[0],
+            "first": networks.judge(params, motion.at[:, :2].multiply(2.0), batch.audio, label)[0],
         }
         expected = {"audio": patches, "label": patches, "first": not patches}
         assert {name: bool(np.any(value != logits)) for name, value in changed.items()} == expected
@@ -331,7 +348,9 @@ class TestObjective:
         model = build(CONFIG, make_data())
         params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
         function = jax.jit(
-            jax.value_and_grad(lambda p: model.stages[1].updates[0].loss(p, jax.random.key(1), batch, jnp.int32(0))[0])
+            jax.value_and_grad(
+                lambda p: stage(model, "emotion_vae").updates[0].loss(p, jax.random.key(1), batch, jnp.int32(0))[0]
+            )
         )
         gradient = function(params)[1]
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["generator"]))
@@ -347,11 +366,30 @@ class TestObjective:
         inner = sum(jax.tree.leaves(jax.tree.map(lambda g, w: np.sum(np.asarray(g) * w), gradient["vae"], way)))
         np.testing.assert_allclose(inner, (ahead - behind) / 2e-7, rtol=1e-4)
 
+    def test_sampled_emotions_are_exchanged_and_features_are_constants(self):
+        model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()
+        params = make_params(model)
+        audio, made, target = generate(networks, params, batch)
+        latent = jax.random.normal(jax.random.key(3), (3, CONFIG.vae_latent))
+        both = judged(networks, params, batch, audio, made, None, latent)
+        features = networks.decode_emotion(params, latent, both.label[3:])
+        own = networks.decode(params, audio._replace(emotion=features), target[:, : CONFIG.seed_frames])
+        np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
+        generator = stage(model, "sampled").updates[1].loss
+        gradient = jax.jit(jax.grad(lambda p: generator(p, jax.random.key(0), batch, jnp.int32(0))[0]))(params)
+        moved = {
+            name
+            for name, tree in gradient["generator"].items()
+            if any(np.any(leaf != 0) for leaf in jax.tree.leaves(tree))
+        }
+        assert moved == {"fusion", "encoder", "prompter", "decoder", "hold"}
+        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["vae"]))
+
     def test_the_vae_begins_with_the_scale_of_the_features(self):
         model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()
         params = make_params(model)
         features = networks.encode_audio(params, batch.audio).emotion
-        measured = model.stages[1].warm_start(params, batch)["vae"]["features"]
+        measured = stage(model, "emotion_vae").warm_start(params, batch)["vae"]["features"]
         np.testing.assert_allclose(measured["mean"], jnp.mean(features, axis=(0, 1)), rtol=1e-5)
         np.testing.assert_allclose(measured["scale"], jnp.std(features, axis=(0, 1)), rtol=0.1, atol=1e-3)
 
@@ -362,14 +400,17 @@ class TestSettings:
         model = build(config, make_data())
         assert set(jax.eval_shape(model.init, jax.random.key(0))) == {"generator"}
         assert model.batch_fields == ("audio", "pose", "emotion")
-        assert [stage.name for stage in model.stages] == ["main"]
-        assert [update.name for update in model.stages[0].updates] == ["generator"]
+        assert [each.name for each in model.stages] == ["mining", "main"]
+        assert [update.name for update in stage(model, "main").updates] == ["generator"]
 
     def test_stages(self):
         model = build(CONFIG, make_data())
         assert model.batch_fields == ("audio", "pose", "emotion", "words", "word_starts")
         spans = stage_spans(model, find_model("emotion_gesture").training["tiny"])
-        assert [(span.stage.name, span.config.steps) for span in spans] == [("main", 2000), ("emotion_vae", 8)]
+        assert [(span.stage.name, span.config.steps) for span in spans] == [
+            *(("mining", 5), ("main", find_model("emotion_gesture").training["tiny"].steps)),
+            *(("emotion_vae", 8), ("sampled", 6)),
+        ]
 
     @pytest.mark.parametrize(
         ("changes", "message"),
@@ -386,6 +427,7 @@ class TestSettings:
             ({"dropout": 1.0}, "--dropout: expected 0 or more and below 1; got 1.0."),
             ({"layers": 0}, "--layers: expected 1 or more; got 0."),
             ({"vae_steps": -1}, "--vae-steps: expected 0 or more; got -1."),
+            ({"sampled_steps": -2}, "--sampled-steps: expected 0 or more; got -2."),
             ({"smoothing": -1}, "--smoothing: expected 0 or more; got -1."),
             ({"discriminator_rate": 0.0}, "--discriminator-rate: expected a number above 0; got 0.0."),
             ({"discriminator": "cnn"}, "--discriminator: expected one of transformer, patches; got cnn."),

@@ -1,4 +1,4 @@
-"""EmotionGesture through the commands: trained in two stages, resumed, generated, evaluated."""
+"""EmotionGesture through the commands: trained in stages, resumed, generated, evaluated."""
 
 import json
 import os
@@ -42,7 +42,9 @@ SETTINGS = {
     "discriminator-hidden": "4",
     "vae-latent": 3,
     "vae-channels": 4,
+    "mining-steps": 2,
     "vae-steps": 4,
+    "sampled-steps": 2,
     "steps": 6,
     "batch-size": 4,
     "warmup-steps": 0,
@@ -182,10 +184,11 @@ def test_pretrained_word_vectors_are_where_training_begins(toy_corpus, tmp_path,
 
 
 def test_resuming_after_sigkill_in_each_stage_equals_not_having_stopped(toy_corpus, tmp_path):
-    settings = {"steps": 40, "vae_steps": 40, "checkpoint_every": 2, "keep_checkpoints": 99}
+    names = ("mining_steps", "steps", "vae_steps", "sampled_steps")
+    settings = {**dict.fromkeys(names, 20), "checkpoint_every": 2, "keep_checkpoints": 99}
     folder, whole = tmp_path / "killed", tmp_path / "whole"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    for wanted in (6, 46):
+    for wanted in (6, 26, 46, 66):
         process = subprocess.Popen(
             [sys.executable, "-m", "a2g_jax.cli", *train(toy_corpus.path, folder, "--resume", **settings)],
             env=environment,

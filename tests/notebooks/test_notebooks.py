@@ -14,7 +14,8 @@ NOTEBOOKS = sorted((Path(__file__).parents[2] / "notebooks").glob("*.ipynb"))
 
 
 def test_there_are_notebooks():
-    assert {"latent_dct_edits", "audio2gestures_tour", "stylized_flow_tour"} <= {path.stem for path in NOTEBOOKS}
+    tours = {"audio2gestures_tour", "stylized_flow_tour", "emotion_gesture_tour"}
+    assert tours | {"latent_dct_edits"} <= {path.stem for path in NOTEBOOKS}
 
 
 #: Seconds that the first cell may take, which does nothing, and then each cell; a few are enough on a quiet machine.

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
+from a2g_jax.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.talker.recordings import cast, resample_motion, talk
 from a2g_jax.talker.speech import plan_from_json
 
@@ -59,6 +60,16 @@ def test_cast_is_deterministic_and_varied():
     assert len({role["speaker"] for role in roles}) == 6
     assert len({role["seed"] for role in roles}) == 12
     assert {role["speaker"] for role in cast(2.0, 0, speakers=("elif",))} == {"elif"}
+
+
+def test_emotions_take_turns_and_leave_the_rest_of_the_cast_as_it_is():
+    plain, equal = cast(32.0, 5), cast(32.0, 5, equal_emotions=True)
+    without = [
+        [{key: value for key, value in role.items() if key != "emotion"} for role in roles] for roles in (plain, equal)
+    ]
+    assert without[0] == without[1]
+    for block in range(0, 32, 8):
+        assert {role["emotion"] for role in equal[block : block + 8]} == set(VOICE_EMOTIONS)
 
 
 def test_bad_arguments():

@@ -1,4 +1,5 @@
 import base64
+import html
 import io
 import json
 import re
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from a2g_jax.errors import InputError
 from a2g_jax.recording import Word
-from a2g_jax.viz.player import Figure, Track, write_page
+from a2g_jax.viz.player import Figure, Track, show_page, write_page
 from a2g_jax.viz.player.encode import decode_positions, encode_positions
 from a2g_jax.viz.player.page import fill_template, script_json
 from tests.viz.figures_for_tests import tone, waving
@@ -137,3 +138,15 @@ def test_bad_input_is_named_and_leaves_no_file(tmp_path, change, message):
     with pytest.raises(InputError, match=message):
         write(tmp_path, **change)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_notebook_shows_the_page_that_a_file_would_hold(tmp_path):
+    words = [Word('<"quoted" & bold>', 0.1, 0.4)]
+    shown = show_page([Figure(waving(), "Recorded")], tone(2.0), 16000, title="It's a title", words=words, height=500)
+    frame = shown._repr_html_()
+    source = re.fullmatch(r'<iframe srcdoc="([^"]*)" width="100%" height="500" style="border: 0"></iframe>', frame)
+    assert source is not None
+    written = write(tmp_path, figures=[Figure(waving(), "Recorded")], title="It's a title", words=words)
+    assert html.unescape(source.group(1)) == written
+    with pytest.raises(InputError, match="no figures"):
+        show_page([], tone(2.0), 16000)

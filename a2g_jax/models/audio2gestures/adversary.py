@@ -17,13 +17,11 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.objective import code_noise, motion_terms
 from a2g_jax.models.base import Params, Stage, Update
+from a2g_jax.models.judged_motion import judged_motion
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.nn.conv import Dense
 from a2g_jax.nn.strided import StridedConv1D
 
-#: Units of the discriminator's input: of positions where they are metres, of z-scores otherwise, and of the numbers of
-#: rotations; speeds are in three of the first a second.
-_METRES, _SCORES, _TURNS, _SECONDS = 0.1, 1.0, 0.3, 3.0
 _SLOPE = 0.2
 #: Added to the size of features before division.
 _EPSILON = 1e-6
@@ -56,27 +54,10 @@ def init_discriminator(key: Key[Array, ""], codec: Codec) -> Params:
     """Initial parameters of the discriminator."""
     frames = 2 ** len(codec.config.discriminator_channels)
     mean = jnp.asarray(codec.data.pose_statistics.mean)
-    motion = discriminator_input(codec, jnp.broadcast_to(mean[None, None], (1, frames, *mean.shape)))
+    motion = judged_motion(codec.data, jnp.broadcast_to(mean[None, None], (1, frames, *mean.shape)))
     shared = jnp.zeros((1, frames, codec.config.code_channels))
     params: Params = Discriminator(codec.config.discriminator_channels).init(key, motion, shared)["params"]
     return params
-
-
-def discriminator_input(codec: Codec, pose: Float[Array, "B T R D"]) -> Float[Array, "B T D2"]:
-    """Places and speeds of the joints, and the pose's own numbers: everything of order one.
-
-    Args:
-        pose: a network's output or recorded poses; made valid first, so that only the motion is judged.
-    """
-    rotations, places = codec.positions(pose)
-    if rotations is None:
-        values, unit = codec.data.pose_statistics.normalise(codec.valid(pose, None)), _SCORES
-    else:
-        # Not z-scores: a joint that hardly moves would give every generated motion away.
-        values, unit = codec.valid(pose, rotations) / _TURNS, _METRES
-    speeds = jnp.diff(places, axis=1, append=places[:, -1:]) * (codec.data.fps / (_SECONDS * unit))
-    flat = lambda array: array.reshape(*array.shape[:2], -1)  # noqa: E731
-    return jnp.concatenate([flat(places / unit), flat(speeds), flat(values)], axis=-1)
 
 
 def adversarial_stage(codec: Codec) -> Stage:
@@ -85,7 +66,7 @@ def adversarial_stage(codec: Codec) -> Stage:
     judge = Discriminator(config.discriminator_channels)
 
     def judged(params: Params, pose: Float[Array, "B T R D"], shared: Float[Array, "B T C"]) -> Features:
-        features: Any = judge.apply({"params": params}, discriminator_input(codec, pose), shared)
+        features: Any = judge.apply({"params": params}, judged_motion(codec.data, pose), shared)
         return features
 
     def discriminator_loss(

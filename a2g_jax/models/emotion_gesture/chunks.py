@@ -114,14 +114,18 @@ def _chunk(
         sampled = sample_emotion(networks, params, key, sampling.temperature, jnp.nan_to_num(weights[0]))
         of_audio = jnp.isnan(weights).any(axis=-1, keepdims=True)
         features = features._replace(emotion=jnp.where(of_audio, features.emotion, sampled[None]))
-    made = networks.decode(params, features, seed[None], labels)[0]
-    before, new = made[: config.seed_frames], made[config.seed_frames :]
-    new = new + fade(sampling.seam_frames, config.stride) * (seed[-1:] - before[-1:])
+    new = networks.decode(params, features, seed[None], labels)[0, config.seed_frames :]
+    if sampling.seam_frames > 0:
+        new = new + seam(seed, new, sampling.seam_frames)
     return networks.flat(space.valid(networks.pose(new[None])))[0]
 
 
 def sample_emotion(
-    networks: Networks, params: Params, key: Key[Array, ""], temperature: float, weights: Float[Array, "N E"]
+    networks: Networks,
+    params: Params,
+    key: Key[Array, ""],
+    temperature: float | Float[Array, ""],
+    weights: Float[Array, "N E"],
 ) -> Float[Array, "N D"]:
     """Emotion features of one random latent: those of each emotion, mixed by its weight at each frame."""
     classes = networks.classes
@@ -131,7 +135,21 @@ def sample_emotion(
     return jnp.einsum("ne,end->nd", weights, each)
 
 
-def fade(frames: int, stride: int) -> Float[Array, "S 1"]:
-    """Weights that fall from almost 1 to 0, smoothly, over the first frames of a chunk."""
-    place = jnp.minimum((jnp.arange(stride) + 1.0) / (frames + 1.0), 1.0)
-    return (1.0 - place * place * (3.0 - 2.0 * place))[:, None] if frames else jnp.zeros((stride, 1))
+def seam(seed: Float[Array, "M C"], new: Float[Array, "S C"], frames: int) -> Float[Array, "S C"]:
+    """What joins a chunk to the poses before it without a step of place or speed: it fades out over some frames.
+
+    With it the speed changes evenly from that of the last poses to the chunk's own: its first pose is one step of their
+    mean after the last one before it. A decoder's output may jump there, or stop for a frame, even where it
+    agrees with the initial poses.
+
+    Args:
+        seed: the poses before the chunk.
+        new: the chunk's own.
+        frames: how many, 1 or more.
+    """
+    before, after = seed[-1:] - seed[-2:-1], new[1:2] - new[:1]
+    gap = seed[-1:] + 0.5 * (before + after) - new[:1]
+    # Hermite's cubic from the gap, and the speed that is missing, to zero and rest.
+    place = jnp.minimum(jnp.arange(len(new))[:, None] / frames, 1.0)
+    rest = jnp.square(1.0 - place)
+    return rest * (1.0 + 2.0 * place) * gap + rest * place * frames * 0.5 * (before - after)

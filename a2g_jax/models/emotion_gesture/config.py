@@ -8,10 +8,13 @@ from a2g_jax.models.train_config import TrainConfig
 HEADERS = ("aligned", "channels")
 BRANCHES = ("emotion-beat", "none", "label")
 POOLS = ("flat", "mean")
+SPANS = ("frames", "clip")
 PROMPTERS = ("spatial-temporal", "spatial", "predictor", "duplicate", "zero")
 PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
 DISCRIMINATORS = ("transformer", "patches")
+#: Whole numbers that may be 0.
+_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps")
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,19 @@ class EmotionGestureConfig:
     """Residual blocks of each stage of the audio encoder."""
     audio_channels: tuple[int, ...] = (32, 64, 128)
     """Channels of each stage."""
+    audio_stem: int = 1
+    """Stride of its first convolution, in time and frequency."""
     header: str = "aligned"
     """How the audio encoder gets to one row a frame: 'aligned' keeps the spectrogram's time and interpolates it to the
     frames; 'channels' makes a frame of each channel of a convolution, as the authors' code."""
     branches: str = "emotion-beat"
     """'emotion-beat': emotion and beat features (EBM); for ablations 'none': features of the audio as they are, and
     'label': the same with the emotion's label beside them."""
+    beat_normalised: bool = False
+    """Whether beat features have mean 0 and standard deviation 1 over a clip, so that what is constant in a clip, as
+    its emotion, cannot be in them."""
+    emotion_span: str = "frames"
+    """Whether emotion features are those of each frame, or their mean over the clip at every frame ('clip')."""
     emotion_pool: str = "flat"
     """What the emotion classifier takes: the features of all frames ('flat') or their mean ('mean')."""
     emotion_hidden: tuple[int, ...] = (512, 256, 64)
@@ -78,8 +88,8 @@ class EmotionGestureConfig:
     smoothing: int = 0
     """Binomial filters over time that end the decoder."""
     discriminator: str = "transformer"
-    """'transformer': of the differences between frames, as published; 'patches': convolutions over poses, differences
-    and the audio, with scores for overlapping stretches, given the emotion."""
+    """'transformer': of the differences between frames, as published; 'patches': convolutions over joint positions,
+    speeds and the audio, with scores for overlapping stretches, given the emotion."""
     discriminator_channels: int = 128
     """Width of the discriminator's layers."""
     discriminator_rate: float = 1.0
@@ -95,6 +105,8 @@ class EmotionGestureConfig:
     """Weight of the L1 distance of poses (Eq. 7)."""
     adversarial_weight: float = 1.0
     """Weight of the adversarial loss (Eq. 8); 0 trains without a discriminator."""
+    shown_emotion_weight: float = 0.0
+    """Weight of the emotion of generated motion as the discriminator classifies it; only with 'patches'."""
     beat_weight: float = 0.05
     """Weight of the beat alignment (Eq. 2), which needs words; 0 trains without them."""
     emotion_weight: float = 0.1
@@ -109,6 +121,11 @@ class EmotionGestureConfig:
     smooth_temperature: float = 10.0
     """Divisor of the true motion's offsets in the motion-smooth loss."""
 
+    mining_steps: int = 0
+    """Training steps of the features of audio and text alone, before all others."""
+    sampled_steps: int = 0
+    """Training steps of the motion with sampled emotion features, after the VAE: with 'exchange', the emotions that the
+    discriminator judges are then sampled."""
     vae_latent: int = 32
     """Length of the emotion-conditioned VAE's latent."""
     vae_channels: int = 40
@@ -116,11 +133,14 @@ class EmotionGestureConfig:
     """Training steps of the emotion-conditioned VAE, after all others; 0 leaves it out."""
     vae_kl_weight: float = 0.003
     """Weight of its KL divergence against the relative squared error."""
+    vae_emotion_weight: float = 0.0
+    """Weight of the emotion that the classifier finds in features of random latents with a label."""
 
     def __post_init__(self) -> None:
         for name, known in (
             ("header", HEADERS),
             ("branches", BRANCHES),
+            ("emotion_span", SPANS),
             ("emotion_pool", POOLS),
             ("prompter", PROMPTERS),
             ("prompt_space", PROMPT_SPACES),
@@ -140,14 +160,13 @@ class EmotionGestureConfig:
                 raise _refused(field.name, "0 or more", value)
             if field.name.endswith("_temperature") and not 0 < value < float("inf"):
                 raise _refused(field.name, "a number above 0", value)
-            if field.type in (int, "int") and field.name not in ("vae_steps", "smoothing") and value < 1:
+            if field.type in (int, "int") and field.name not in _MAYBE_NONE and value < 1:
                 raise _refused(field.name, "1 or more", value)
-        if self.smoothing < 0:
-            raise _refused("smoothing", "0 or more", self.smoothing)
+        for name in _MAYBE_NONE:
+            if getattr(self, name) < 0:
+                raise _refused(name, "0 or more", getattr(self, name))
         if not 0 < self.discriminator_rate < float("inf"):
             raise _refused("discriminator_rate", "a number above 0", self.discriminator_rate)
-        if self.vae_steps < 0:
-            raise _refused("vae_steps", "0 or more", self.vae_steps)
         if not 0 <= self.dropout < 1:
             raise _refused("dropout", "0 or more and below 1", self.dropout)
         for name in ("channels", "discriminator_channels"):
@@ -172,6 +191,11 @@ class EmotionGestureConfig:
         return self.branches == "emotion-beat"
 
     @property
+    def trains_sampled(self) -> bool:
+        """Whether motion is trained with sampled emotion features."""
+        return self.exchanges and self.vae_steps > 0 and self.sampled_steps > 0 and self.adversarial_weight > 0
+
+    @property
     def exchanges(self) -> bool:
         """Whether emotion features are exchanged."""
         return self.exchange and self.mines and self.discriminator == "patches"
@@ -185,29 +209,38 @@ PRESETS: dict[str, EmotionGestureConfig] = {
     "paper": EmotionGestureConfig(),
     "authors": EmotionGestureConfig(header="channels", prompt_space="poses"),
     "tiny": EmotionGestureConfig(
-        channels=128,
+        channels=96,
         heads=4,
-        hidden=256,
+        hidden=192,
         layers=2,
         dropout=0.1,
         audio_blocks=(1, 1, 1),
         audio_channels=(8, 16, 32),
+        audio_stem=2,
+        beat_normalised=True,
+        emotion_span="clip",
         emotion_pool="mean",
         emotion_hidden=(64,),
         word_width=64,
-        word_buckets=2048,
+        word_buckets=1024,
         scaled_scores=True,
         query_positions=True,
         hold_seed=True,
         normalise_pose=True,
-        smoothing=1,
+        smoothing=3,
         discriminator="patches",
         discriminator_channels=64,
-        discriminator_rate=0.5,
         exchange=True,
-        reconstruction_weight=20.0,
+        reconstruction_weight=5.0,
+        emotion_weight=1.0,
+        shown_emotion_weight=0.4,
         beat_form="words",
+        beat_weight=0.3,
+        mining_steps=3_000,
         vae_steps=600,
+        sampled_steps=2_000,
+        vae_kl_weight=0.01,
+        vae_emotion_weight=0.6,
     ),
 }
 

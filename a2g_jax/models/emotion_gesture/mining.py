@@ -14,6 +14,8 @@ from a2g_jax.nn.se_resnet import SEResNet, convolution, group_norm
 _XAVIER = nn.initializers.xavier_uniform()
 #: Slope of the leaky rectifier below zero.
 _SLOPE = 0.2
+#: Added to variances of features before division.
+_LEAST = 1e-5
 #: Regions of frequency that the aligned header keeps apart.
 _REGIONS = 4
 
@@ -53,11 +55,13 @@ class AudioEncoder(nn.Module):
     all over the spectrogram for channel n is the row of frame n.
 
     Args:
+        stem: stride of the first convolution, in time and frequency.
         spectra: spectra in a row of audio features.
     """
 
     blocks: Sequence[int]
     channels: Sequence[int]
+    stem: int
     features: int
     header: str
     spectra: int
@@ -66,7 +70,9 @@ class AudioEncoder(nn.Module):
     @nn.compact
     def __call__(self, audio: Float[Array, "B N width"], deterministic: bool) -> Float[Array, "B N D"]:
         clips, frames, width = audio.shape
-        x = SEResNet(self.blocks, self.channels)(audio.reshape(clips, frames * self.spectra, width // self.spectra))
+        x = SEResNet(self.blocks, self.channels, self.stem)(
+            audio.reshape(clips, frames * self.spectra, width // self.spectra)
+        )
         if self.header == "channels":
             x = group_norm(frames)(convolution(frames)(x))
             x = x.transpose(0, 3, 1, 2).reshape(clips, frames, -1)
@@ -85,6 +91,12 @@ def _regions(x: Float[Array, "B T F C"]) -> Float[Array, "B T _"]:
     return jnp.concatenate(
         [jnp.mean(x[:, :, first:stop], axis=2) for first, stop in zip(edges, edges[1:], strict=False)], axis=-1
     )
+
+
+def standardised(features: Float[Array, "B N D"]) -> Float[Array, "B N D"]:
+    """Features with mean 0 and standard deviation 1 over each clip's frames: nothing that is constant in a clip."""
+    centred = features - jnp.mean(features, axis=1, keepdims=True)
+    return centred * jax.lax.rsqrt(jnp.mean(jnp.square(centred), axis=1, keepdims=True) + _LEAST)
 
 
 class EmotionClassifier(nn.Module):

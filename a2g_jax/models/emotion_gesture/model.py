@@ -17,7 +17,13 @@ from a2g_jax.models.emotion_gesture import chunks
 from a2g_jax.models.emotion_gesture.chunks import Given, State
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
 from a2g_jax.models.emotion_gesture.networks import Networks
-from a2g_jax.models.emotion_gesture.objective import discriminator_loss, generate, generator_loss, vae_loss
+from a2g_jax.models.emotion_gesture.objective import (
+    discriminator_loss,
+    generate,
+    generator_loss,
+    mining_loss,
+    vae_loss,
+)
 from a2g_jax.models.emotion_gesture.sampling import AUDIO, LABEL, EmotionGestureSampling
 from a2g_jax.models.emotion_gesture.word_table import fill_table
 from a2g_jax.models.emotion_timeline import check_emotions, emotion_rows, parse_timeline
@@ -44,7 +50,6 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
     networks = Networks(config, data)
     _check_sampling(networks, sampling)
     conditioned = sampling.emotion == LABEL or sampling.names_emotions or config.branches == "label"
-    optimiser = partial(make_optimiser, momentum=_MOMENTUM)
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
         """The calmest pose of each clip, and its speed, mean change of a value over three frames."""
@@ -105,19 +110,6 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         text = params["generator"]["text"] | {"vectors": jnp.asarray(filled)}
         return params | {"generator": params["generator"] | {"text": text}}
 
-    updates = [Update(generator_loss(networks, True), ("generator",), "generator", optimiser)]
-    held_out = generator_loss(networks, False)
-    if config.adversarial_weight > 0:
-        game = discriminator_loss(networks, True)
-        slower = lambda settings: optimiser(  # noqa: E731
-            replace(settings, learning_rate=config.discriminator_rate * settings.learning_rate)
-        )
-        updates = [Update(game, ("discriminator",), "discriminator", slower), *updates]
-    stages = [Stage(tuple(updates), validation_loss=held_out)]
-    if networks.samples_emotions:
-        update = Update(vae_loss(networks), ("vae",), optimiser=_vae_optimiser)
-        measure = lambda params, batch: networks.measure_features(params, batch.audio)  # noqa: E731
-        stages.append(Stage((update,), "emotion_vae", config.vae_steps, warm_start=measure))
     reads = config.mines and config.beat_weight > 0
     return Model(
         "emotion_gesture",
@@ -125,7 +117,7 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         config.clip_frames,
         max(config.seed_frames, config.stride - 1),
         networks.init,
-        tuple(stages),
+        _stages(networks),
         summarise,
         batch_fields=("audio", "pose", "emotion", *(("words", "word_starts") if reads else ())),
         use_words=use_words if reads and config.word_vectors else None,
@@ -140,6 +132,42 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         overlap=config.stride - 1,
         reconstruct=reconstruct,
     )
+
+
+def _stages(networks: Networks) -> tuple[Stage, ...]:
+    """The stages of training: features, everything, the emotion-conditioned VAE, and motion with its samples."""
+    config = networks.config
+    stages = []
+    if config.mines and config.mining_steps > 0:
+        features = Update(mining_loss(networks, True), ("generator",))
+        stages.append(Stage((features,), "mining", config.mining_steps, mining_loss(networks, False)))
+    stages.append(Stage(_game(networks, False), validation_loss=generator_loss(networks, False)))
+    if networks.samples_emotions:
+        update = Update(vae_loss(networks), ("vae",), optimiser=_vae_optimiser)
+        measure = lambda params, batch: networks.measure_features(params, batch.audio)  # noqa: E731
+        stages.append(Stage((update,), "emotion_vae", config.vae_steps, warm_start=measure))
+    if config.trains_sampled:
+        held_out = generator_loss(networks, False, True)
+        stages.append(Stage(_game(networks, True), "sampled", config.sampled_steps, held_out))
+    return tuple(stages)
+
+
+def _game(networks: Networks, sampled: bool) -> tuple[Update, ...]:
+    """The updates of the generator and its discriminator.
+
+    Args:
+        sampled: with sampled emotion features.
+    """
+    config = networks.config
+    optimiser = partial(make_optimiser, momentum=_MOMENTUM)
+    generator = Update(generator_loss(networks, True, sampled), ("generator",), "generator", optimiser)
+    if config.adversarial_weight == 0:
+        return (generator,)
+    slower = lambda settings: optimiser(  # noqa: E731
+        replace(settings, learning_rate=config.discriminator_rate * settings.learning_rate)
+    )
+    judge = Update(discriminator_loss(networks, True, sampled), ("discriminator",), "discriminator", slower)
+    return judge, generator
 
 
 def _vae_optimiser(settings: TrainConfig) -> optax.GradientTransformation:

@@ -11,8 +11,8 @@ from a2g_jax.nn.rates import smoothed
 from a2g_jax.nn.strided import StridedConv1D
 from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
 
-#: Factor on the differences between frames beside poses: both are then of order one, in z-scores.
-_SPEED = 4.0
+#: Factor on the speed of the last initial pose, for each frame after it.
+_SLOWING = 0.6
 #: Layers of the patch discriminator that halve time; a score depends on 22 frames.
 _HALVINGS = 3
 
@@ -51,7 +51,10 @@ class PoseDecoder(nn.Module):
 
 
 class SeedHold(nn.Module):
-    """The initial poses, and after them the last one on its way to a mean pose, by a learned share for each value."""
+    """The initial poses, and after them the last one on its way to a mean pose, by a learned share for each value.
+
+    The last pose keeps moving first, slower with each frame, so that the speed has no step.
+    """
 
     frames: int
 
@@ -60,29 +63,33 @@ class SeedHold(nn.Module):
         later = self.frames - seed.shape[1]
         share = nn.sigmoid(self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2])))[None]
         centre = mean[None, None]
-        return jnp.concatenate([seed, centre + share * (seed[:, -1:] - centre)], axis=1)
+        way = jnp.cumsum(_SLOWING ** (1.0 + jnp.arange(later)))[None, :, None]
+        held = seed[:, -1:] + way * (seed[:, -1:] - seed[:, -2:-1])
+        return jnp.concatenate([seed, centre + share * (held - centre)], axis=1)
 
 
 class PatchDiscriminator(nn.Module):
     """Logits for overlapping stretches of a motion with its audio, given an emotion; positive for recorded ones.
 
-    The emotion enters by a product with the features of a stretch (Miyato and Koyama 2018).
+    The emotion enters by a product with the features of a stretch (Miyato and Koyama 2018). A second head classifies
+    the emotion of each clip from the motion alone (Odena et al. 2017).
     """
 
     channels: int
 
     @nn.compact
     def __call__(
-        self, motion: Float[Array, "B N C"], audio: Float[Array, "B N bands"], label: Float[Array, "B E"]
-    ) -> Float[Array, "B _"]:
-        speed = _SPEED * jnp.diff(motion, axis=1, append=motion[:, -1:])
+        self, motion: Float[Array, "B N D"], audio: Float[Array, "B N bands"], label: Float[Array, "B E"]
+    ) -> tuple[Float[Array, "B _"], Float[Array, "B E"]]:
+        moved = dense(self.channels)(motion)
         sound = dense(self.channels)(audio) / audio.shape[-1] ** 0.5
-        x = bent(dense(self.channels)(jnp.concatenate([motion, speed, sound], axis=-1)))
+        x, y = bent(moved + sound), bent(moved)
         for _ in range(_HALVINGS):
             x = bent(StridedConv1D(self.channels)(x))
+            y = bent(StridedConv1D(self.channels)(y))
         shown = nn.Dense(self.channels, use_bias=False, kernel_init=nn.initializers.xavier_uniform())(label)
         product = jnp.sum(x * shown[:, None], axis=-1) / self.channels**0.5
-        return dense(1)(x)[..., 0] + product
+        return dense(1)(x)[..., 0] + product, dense(label.shape[-1])(jnp.mean(y, axis=1))
 
 
 class Discriminator(nn.Module):
@@ -94,10 +101,10 @@ class Discriminator(nn.Module):
     hidden: Sequence[int]
 
     @nn.compact
-    def __call__(self, offsets: Float[Array, "B N C"]) -> Float[Array, " B"]:
+    def __call__(self, offsets: Float[Array, "B N C"]) -> tuple[Float[Array, "B 1"], None]:
         x = Encoder(self.layers, self.heads, 4 * self.channels, 0.0)(dense(self.channels)(offsets), True)
         x = bent(dense(self.channels // 2)(x)).reshape(len(offsets), -1)
         for width in self.hidden:
             x = bent(dense(width)(x))
         logits: Float[Array, "B 1"] = dense(1)(x)
-        return logits[:, 0]
+        return logits, None

@@ -10,14 +10,24 @@ from jaxtyping import Array, Float, Int, Key
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Data, Params
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
-from a2g_jax.models.emotion_gesture.mining import AudioEncoder, EmotionClassifier, Projector, TextEncoder, unmined
+from a2g_jax.models.emotion_gesture.mining import (
+    AudioEncoder,
+    EmotionClassifier,
+    Projector,
+    TextEncoder,
+    standardised,
+    unmined,
+)
 from a2g_jax.models.emotion_gesture.motion import Discriminator, PatchDiscriminator, PoseDecoder, SeedHold
 from a2g_jax.models.emotion_gesture.prompter import PosePrompter
 from a2g_jax.models.emotion_gesture.vae import FeatureDecoder, FeatureEncoder
+from a2g_jax.models.judged_motion import judged_motion
 from a2g_jax.nn.transformer import Encoder
 
 #: Added to standard deviations of emotion features, before division.
 _LEAST = 1e-3
+#: Networks of the features of audio and text.
+_MINING = ("audio", "emotion", "beat", "classifier", "text")
 #: Source of dropout: None for none.
 DropoutKey = Key[Array, ""] | None
 
@@ -50,7 +60,9 @@ class Networks:
         self.classes = len(data.emotions)
         self.normalised = c.normalise_pose or not data.space.unit_scale
         modules = {
-            "audio": AudioEncoder(c.audio_blocks, c.audio_channels, c.channels, c.header, data.spectra, c.dropout),
+            "audio": AudioEncoder(
+                c.audio_blocks, c.audio_channels, c.audio_stem, c.channels, c.header, data.spectra, c.dropout
+            ),
             "fusion": Projector(c.channels, c.dropout),
             "encoder": Encoder(c.layers, c.heads, c.hidden, c.dropout),
             "prompter": PosePrompter(
@@ -104,7 +116,7 @@ class Networks:
             }
         }
         if c.adversarial_weight > 0:
-            motion = jnp.zeros((1, c.clip_frames, self.values))
+            motion = self.flat(jnp.broadcast_to(self.data.pose_statistics.mean, (1, c.clip_frames, *self.rows)))
             inputs["judge"] = self._judged(motion, audio, jnp.zeros((1, self.classes)))
             params["discriminator"] = self._judge.init(jax.random.fold_in(key, 100), *inputs["judge"])["params"]
         if self.samples_emotions:
@@ -131,9 +143,18 @@ class Networks:
         features = self._apply(params, "audio", key, audio)
         if not self.config.mines:
             return AudioFeatures(features)
-        emotion = self._apply(params, "emotion", key, features)
-        logits: Any = self._generator["classifier"].apply({"params": params["generator"]["classifier"]}, emotion)
-        return AudioFeatures(self._apply(params, "beat", key, features), emotion, logits)
+        emotion = self._spanned(self._apply(params, "emotion", key, features))
+        logits = self.classify(params, emotion)
+        beat = self._apply(params, "beat", key, features)
+        if self.config.beat_normalised:
+            beat = standardised(beat)
+        return AudioFeatures(beat, emotion, logits)
+
+    def classify(self, params: Params, emotion: Float[Array, "B N D"]) -> Float[Array, "B E"]:
+        """Logits of the emotions, from emotion features."""
+        own = {"params": params["generator"]["classifier"]}
+        logits: Float[Array, "B E"] = self._generator["classifier"].apply(own, emotion)
+        return logits
 
     def encode_text(self, params: Params, words: Int[Array, "B N"], key: DropoutKey = None) -> Float[Array, "B N D"]:
         """Features of a transcript; see :class:`~a2g_jax.models.emotion_gesture.mining.TextEncoder`."""
@@ -171,17 +192,18 @@ class Networks:
         motion: Float[Array, "B N C"],
         audio: Float[Array, "B N bands"],
         label: Float[Array, "B E"],
-    ) -> Float[Array, " L"]:
-        """The discriminator's logits of motions, of all clips and stretches."""
-        logits: Any = self._judge.apply({"params": params["discriminator"]}, *self._judged(motion, audio, label))
-        return logits.reshape(-1)
+    ) -> tuple[Float[Array, " L"], Float[Array, "B E"] | None]:
+        """The discriminator's logits of motions, of all clips and stretches, and of their emotions."""
+        found: Any = self._judge.apply({"params": params["discriminator"]}, *self._judged(motion, audio, label))
+        scores, emotions = found
+        return scores.reshape(-1), emotions
 
     def _judged(self, motion: Array, audio: Array, label: Array) -> tuple[Array, ...]:
         """Input of the discriminator; patches begin with the last initial pose, which is given."""
         if self.config.discriminator == "transformer":
             return (jnp.diff(motion, axis=1),)
         first = self.config.seed_frames - 1
-        return motion[:, first:], audio[:, first:], label
+        return judged_motion(self.data, self.pose(motion[:, first:])), audio[:, first:], label
 
     def encode_emotion(
         self, params: Params, features: Float[Array, "B N D"], label: Float[Array, "B E"]
@@ -198,7 +220,14 @@ class Networks:
         """Emotion features of latents."""
         own = jax.lax.stop_gradient(params["vae"]["features"])
         scores: Any = self._vae_decoder.apply({"params": params["vae"]["decoder"]}, latent, label)
-        return scores * own["scale"][None, None] + own["mean"][None, None]
+        return self._spanned(scores * own["scale"][None, None] + own["mean"][None, None])
+
+    def freeze_mining(self, params: Params) -> Params:
+        """The parameters with the networks of the features of audio and text, and the VAE, as constants."""
+        generator = {
+            name: jax.lax.stop_gradient(own) if name in _MINING else own for name, own in params["generator"].items()
+        }
+        return params | {"generator": generator, "vae": jax.lax.stop_gradient(params["vae"])}
 
     def measure_features(self, params: Params, audio: Float[Array, "B N bands"]) -> Params:
         """The parameters with mean and standard deviation of the emotion features of clips, for the VAE."""
@@ -206,6 +235,12 @@ class Networks:
         assert features is not None
         measured = {"mean": jnp.mean(features, axis=(0, 1)), "scale": jnp.std(features, axis=(0, 1)) + _LEAST}
         return params | {"vae": params["vae"] | {"features": measured}}
+
+    def _spanned(self, emotion: Float[Array, "B N D"]) -> Float[Array, "B N D"]:
+        """Emotion features of frames, or their mean over the clip."""
+        if self.config.emotion_span == "frames":
+            return emotion
+        return jnp.broadcast_to(jnp.mean(emotion, axis=1, keepdims=True), emotion.shape)
 
     def _apply(self, params: Params, name: str, key: DropoutKey, *inputs: Array) -> Any:
         module, own = self._generator[name], {"params": params["generator"][name]}

@@ -52,32 +52,68 @@ def judged(
     audio: AudioFeatures,
     made: Float[Array, "B N C"],
     key: DropoutKey,
+    latent: Float[Array, "B Z"] | None = None,
 ) -> Judged:
-    """The motions of a batch, and those with the emotion features and the label of the next clip, if exchanged."""
+    """The motions of a batch, and those with the emotion of the next clip, if exchanged.
+
+    With sampled features every other clip keeps its own emotion: a chunk in generation begins with poses that already
+    show the emotion, and must not show more and more of it.
+
+    Args:
+        latent: of the VAE, to sample the features of those emotions; None for the features of the next clips.
+    """
     label = one_hot(networks, batch)
     if not networks.config.exchanges or audio.emotion is None:
         return Judged(made, batch.audio, label)
-    other = audio._replace(emotion=jnp.roll(audio.emotion, 1, axis=0))
+    wanted = jnp.roll(label, 1, axis=0)
+    if latent is None:
+        features = jnp.roll(audio.emotion, 1, axis=0)
+    else:
+        wanted = jnp.where(jnp.arange(len(label))[:, None] % 2 == 0, label, wanted)
+        features = networks.decode_emotion(params, latent, wanted)
     seed = networks.flat(batch.pose)[:, : networks.config.seed_frames]
-    exchanged = networks.decode(params, other, seed, None, key)
+    exchanged = networks.decode(params, audio._replace(emotion=features), seed, None, key)
     return Judged(
-        jnp.concatenate([made, exchanged]),
-        jnp.concatenate([batch.audio] * 2),
-        jnp.concatenate([label, jnp.roll(label, 1, axis=0)]),
+        jnp.concatenate([made, exchanged]), jnp.concatenate([batch.audio] * 2), jnp.concatenate([label, wanted])
     )
 
 
-def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
+def _latent(networks: Networks, key: Key[Array, ""], batch: Batch, sampled: bool) -> Float[Array, "B Z"] | None:
+    """Random latents of the VAE for a batch, where its features are sampled."""
+    shape = (len(batch.pose), networks.config.vae_latent)
+    return jax.random.normal(jax.random.fold_in(key, 2), shape) if sampled else None
+
+
+def mining_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
+    """The losses of the features alone: emotion classification and beat alignment (Eq. 2).
+
+    Args:
+        training: with dropout.
+    """
+
+    def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
+        del step
+        dropout = key if training else None
+        terms, weights = _mined(networks, params, batch, networks.encode_audio(params, batch.audio, dropout), dropout)
+        return _total(terms, weights), terms
+
+    return loss
+
+
+def generator_loss(networks: Networks, training: bool, sampled: bool = False) -> Callable[..., tuple[Array, Terms]]:
     """The generator's loss: Eq. 9 with the generator's side of Eq. 8.
 
     Args:
         training: with dropout.
+        sampled: exchanged emotion features are samples of the VAE, and what they depend on is a constant.
     """
     config = networks.config
 
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
         del step
         dropout = key if training else None
+        if sampled:
+            params = networks.freeze_mining(params)
         audio, made, target = generate(networks, params, batch, dropout)
         terms = {"reconstruction": losses.reconstruction(target, made)}
         weights = {"reconstruction": config.reconstruction_weight}
@@ -86,51 +122,79 @@ def generator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Ar
             weights["smooth"] = config.smooth_weight
         if config.adversarial_weight > 0:
             frozen = params | {"discriminator": jax.lax.stop_gradient(params["discriminator"])}
-            fake = judged(networks, frozen, batch, audio, made, dropout)
-            terms["adversarial"] = losses.generator_adversarial(networks.judge(frozen, *fake))
+            latent = _latent(networks, key, batch, sampled)
+            fake = judged(networks, frozen, batch, audio, made, dropout, latent)
+            scores, shown = networks.judge(frozen, *fake)
+            terms["adversarial"] = losses.generator_adversarial(scores)
             weights["adversarial"] = config.adversarial_weight
-        if audio.logits is not None and config.emotion_weight > 0:
-            assert batch.emotion is not None
-            entropy = optax.softmax_cross_entropy_with_integer_labels(audio.logits, batch.emotion)
-            terms["emotion"] = jnp.mean(entropy)
-            weights["emotion"] = config.emotion_weight
-        if batch.words is not None and batch.word_starts is not None:
-            text = networks.encode_text(params, start_words(batch.words, batch.word_starts), dropout)
-            terms["beat"] = losses.beat_alignment(
-                text, audio.beat, batch.word_starts, config.beat_temperature, config.beat_form
-            )
-            weights["beat"] = config.beat_weight
-        total = sum((weights[name] * terms[name] for name in weights), start=jnp.zeros(()))
-        if audio.logits is not None and batch.emotion is not None:
-            right = jnp.argmax(audio.logits, axis=-1) == batch.emotion
-            terms["emotion_accuracy"] = jnp.mean(right.astype(jnp.float32))
-        return total, terms
+            if shown is not None and config.shown_emotion_weight > 0:
+                terms["shown_emotion"] = jnp.mean(optax.softmax_cross_entropy(shown, fake.label))
+                weights["shown_emotion"] = config.shown_emotion_weight
+        mined, mined_weights = _mined(networks, params, batch, audio, dropout)
+        return _total(terms | mined, weights | mined_weights), terms | mined
 
     return loss
 
 
-def discriminator_loss(networks: Networks, training: bool) -> Callable[..., tuple[Array, Terms]]:
-    """The discriminator's side of Eq. 8; the generator is a constant.
+def _mined(
+    networks: Networks, params: Params, batch: Batch, audio: AudioFeatures, key: DropoutKey
+) -> tuple[Terms, dict[str, float]]:
+    """The losses of the features of a batch, with their weights; the accuracy of the emotions has none."""
+    config = networks.config
+    terms: Terms = {}
+    weights: dict[str, float] = {}
+    if audio.logits is not None and batch.emotion is not None:
+        if config.emotion_weight > 0:
+            terms["emotion"] = jnp.mean(optax.softmax_cross_entropy_with_integer_labels(audio.logits, batch.emotion))
+            weights["emotion"] = config.emotion_weight
+        right = jnp.argmax(audio.logits, axis=-1) == batch.emotion
+        terms["emotion_accuracy"] = jnp.mean(right.astype(jnp.float32))
+    if batch.words is not None and batch.word_starts is not None:
+        text = networks.encode_text(params, start_words(batch.words, batch.word_starts), key)
+        terms["beat"] = losses.beat_alignment(
+            text, audio.beat, batch.word_starts, config.beat_temperature, config.beat_form
+        )
+        weights["beat"] = config.beat_weight
+    return terms, weights
+
+
+def _total(terms: Terms, weights: dict[str, float]) -> Float[Array, ""]:
+    return sum((weight * terms[name] for name, weight in weights.items()), start=jnp.zeros(()))
+
+
+def discriminator_loss(networks: Networks, training: bool, sampled: bool = False) -> Callable[..., tuple[Array, Terms]]:
+    """The discriminator's side of Eq. 8, and its classification of emotions; the generator is a constant.
 
     Args:
         training: with dropout in the generator.
+        sampled: exchanged emotion features are samples of the VAE.
     """
+    config = networks.config
 
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
         del step
         frozen = params | {"generator": jax.lax.stop_gradient(params["generator"])}
         dropout = key if training else None
         audio, made, target = generate(networks, frozen, batch, dropout)
-        real = networks.judge(params, target, batch.audio, one_hot(networks, batch))
-        fake = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout))
-        value = losses.discriminator_adversarial(real, fake)
-        return value, {"discriminator": value}
+        label = one_hot(networks, batch)
+        real, shown = networks.judge(params, target, batch.audio, label)
+        latent = _latent(networks, key, batch, sampled)
+        fake, _ = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout, latent))
+        terms = {"discriminator": losses.discriminator_adversarial(real, fake)}
+        if shown is not None and config.shown_emotion_weight > 0:
+            # Of recorded motion only, so that the classes are those of people.
+            terms["recorded_emotion"] = jnp.mean(optax.softmax_cross_entropy(shown, label))
+        return sum(terms.values(), start=jnp.zeros(())), terms
 
     return loss
 
 
 def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
-    """Relative squared error of emotion features and the KL divergence; everything else is a constant."""
+    """Relative squared error of emotion features, the KL divergence, and the emotion of features that are sampled.
+
+    The emotion classifier judges features of random latents with a label: without this term, latents that hold the
+    emotion themselves are an optimum too, in which the label has no effect. Everything but the VAE is a constant.
+    """
     config = networks.config
 
     def loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Float[Array, ""], Terms]:
@@ -142,6 +206,12 @@ def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
         made = networks.decode_emotion(params, vae.draw(key, mean, log_variance), label)
         scale = frozen["vae"]["features"]["scale"]
         terms = {"vae_error": vae.relative_error(features, made, scale), "vae_kl": vae.divergence(mean, log_variance)}
-        return terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"], terms
+        loss = terms["vae_error"] + config.vae_kl_weight * terms["vae_kl"]
+        if config.vae_emotion_weight > 0:
+            latent = jax.random.normal(jax.random.fold_in(key, 1), mean.shape, mean.dtype)
+            logits = networks.classify(frozen, networks.decode_emotion(params, latent, label))
+            terms["vae_emotion"] = jnp.mean(optax.softmax_cross_entropy(logits, label))
+            loss = loss + config.vae_emotion_weight * terms["vae_emotion"]
+        return loss, terms
 
     return loss

@@ -7,5 +7,6 @@ from a2g_jax.viz.player.figure import Hands as Hands
 from a2g_jax.viz.player.figure import Lane as Lane
 from a2g_jax.viz.player.figure import Mark as Mark
 from a2g_jax.viz.player.figure import Track as Track
+from a2g_jax.viz.player.inline import show_page as show_page
 from a2g_jax.viz.player.page import write_page as write_page
 from a2g_jax.viz.player.screenshot import screenshot_page as screenshot_page

@@ -66,6 +66,29 @@ def write_page(
     Raises:
         InputError: no figures, a motion without frames, values that are not finite, or a motion spanning over 65 m.
     """
+    page = page_html(
+        figures, audio, sample_rate, title=title, subtitle=subtitle, words=words, lanes=lanes, footer=footer
+    )
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+
+
+def page_html(
+    figures: Sequence[Figure],
+    audio: Float[np.ndarray, " N"],
+    sample_rate: int,
+    *,
+    title: str = "",
+    subtitle: str = "",
+    words: Sequence[Word] = (),
+    lanes: Sequence[Lane] = (),
+    footer: str = "",
+) -> str:
+    """The text of the page that :func:`write_page` writes.
+
+    Raises:
+        InputError: as there.
+    """
     if not figures:
         raise InputError("the page has no figures; give at least one.")
     data = {
@@ -75,7 +98,7 @@ def write_page(
         "lanes": [lane.encoded() for lane in lanes],
         "figures": [_figure(figure) for figure in figures],
     }
-    page = fill_template(
+    return fill_template(
         _template("page.html"),
         {
             "title": html.escape(title),
@@ -86,8 +109,6 @@ def write_page(
             "data": script_json(data),
         },
     )
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
 def fill_template(template: str, values: dict[str, str]) -> str:

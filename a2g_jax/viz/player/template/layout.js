@@ -13,7 +13,7 @@ const LABEL = 88; // CSS pixels that a figure's label needs to be legible
 function chooseRows(count, spacing, tall, width, height) {
   let best = 1, bestScale = 0;
   const most = Math.min(count, 4);
-  for (let rows = count > 6 ? 2 : 1; rows <= most; rows++) {
+  for (let rows = 1; rows <= most; rows++) {
     const columns = Math.ceil(count / rows);
     if (width / columns < LABEL && rows < most) continue;
     const scale = Math.min((height / rows - 90) / tall, width / (columns * spacing));
@@ -29,21 +29,25 @@ function arrange(figures, visible, overlay, width, height) {
   let spacing = clamp(1.4 * reach, 0.5 * tall, 1.3 * tall);
   const rows = overlay ? 1 : chooseRows(visible.length, spacing, tall, width, height);
   const columns = overlay ? visible.length : Math.ceil(visible.length / rows), phone = width < 640;
+  // Bands differ in margins; what is free for bodies is equal, and so is their size.
+  const edges = Array.from({ length: rows }, (_, row) => margins(row, rows, phone, overlay));
+  const free = Math.max((height - edges.reduce((sum, edge) => sum + edge.top + edge.bottom, 0)) / rows, 24);
   // Where height decides the size, use the width that is left, within reason and for the labels.
-  const metre = (height / rows - 80) / (1.1 * tall), fills = (width - (phone ? 20 : 60)) / (columns * metre);
+  const metre = free / (1.1 * tall), fills = (width - (phone ? 20 : 60)) / (columns * metre);
   if (!overlay) spacing = Math.max(spacing, Math.min(fills, Math.max(0.95 * tall, 1.4 * LABEL / metre)));
   const bands = [];
-  for (let row = 0; row < rows; row++) {
-    const members = visible.slice(row * columns, (row + 1) * columns);
-    const y = Math.round(row * height / rows), bottom = Math.round((row + 1) * height / rows);
+  for (let row = 0, y = 0; row < rows; row++) {
+    const members = visible.slice(row * columns, (row + 1) * columns), margin = edges[row];
+    const bottom = row === rows - 1 ? height : Math.round(y + margin.top + free + margin.bottom);
     bands.push({
-      x: 0, y, width, height: bottom - y, members, margin: margins(row, rows, phone, overlay),
+      x: 0, y, width, height: bottom - y, members, margin,
       slots: members.map((_, k) => (overlay ? [0, 0, 0] : [(k - (members.length - 1) / 2) * spacing, 0, 0])),
       spacing,
       // The widest row decides the size, so that all rows show bodies equally large.
       frame: { half: overlay ? spacing / 2 : columns * spacing / 2, tall },
       extent: { half: [(overlay ? 0.5 : members.length / 2) * spacing + 0.5, Math.max(reach, 0.7)], height: 1.25 * tall },
     });
+    y = bottom;
   }
   return bands;
 }

@@ -1,0 +1,1 @@
+"""EmotionGesture's Tables I to IV, and claims about the method, on the generated corpus."""
