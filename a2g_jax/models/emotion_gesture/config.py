@@ -80,6 +80,9 @@ class EmotionGestureConfig:
     sigmoid and softmax begin saturated."""
     query_positions: bool = False
     """Whether the decoder's queries have a position encoding; without one, zeros are the same query at every frame."""
+    query_audio: bool = False
+    """Whether the audio's features are added to the decoder's queries of the same frames, beside the attention to all
+    of them."""
     hold_seed: bool = False
     """Whether the decoder's output is added to the initial poses, of which the last one is held and fades to the mean
     pose by learned shares."""
@@ -94,6 +97,9 @@ class EmotionGestureConfig:
     """Width of the discriminator's layers."""
     discriminator_rate: float = 1.0
     """Its learning rate, relative to the generator's."""
+    mismatched: bool = False
+    """Whether recorded motion with the audio of another clip counts as false (Reed et al. 2016), so that the
+    discriminator judges how motion and audio agree; only with 'patches'."""
     exchange: bool = False
     """Whether the adversarial loss also has motions with the emotion features of another clip of the batch, which the
     discriminator judges with that clip's emotion; only with 'patches' and emotion features."""
@@ -225,13 +231,15 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         word_buckets=1024,
         scaled_scores=True,
         query_positions=True,
+        query_audio=True,
         hold_seed=True,
         normalise_pose=True,
         smoothing=3,
         discriminator="patches",
         discriminator_channels=64,
+        mismatched=True,
         exchange=True,
-        reconstruction_weight=5.0,
+        reconstruction_weight=2.5,
         emotion_weight=1.0,
         shown_emotion_weight=0.4,
         beat_form="words",

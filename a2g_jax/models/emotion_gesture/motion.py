@@ -13,8 +13,10 @@ from a2g_jax.nn.transformer import Encoder, PostNormLayer, sinusoids
 
 #: Factor on the speed of the last initial pose, for each frame after it.
 _SLOWING = 0.6
-#: Layers of the patch discriminator that halve time; a score depends on 22 frames.
-_HALVINGS = 3
+#: Logit of the share of the held pose, at first more than half: it leaves for the mean pose within some frames.
+_HELD, _LEAVING = 5.0, 4.0
+#: Layers of the patch discriminator that halve time; a score depends on 46 frames.
+_HALVINGS = 4
 
 
 class PoseDecoder(nn.Module):
@@ -61,7 +63,8 @@ class SeedHold(nn.Module):
     @nn.compact
     def __call__(self, seed: Float[Array, "B M C"], mean: Float[Array, " C"]) -> Float[Array, "B N C"]:
         later = self.frames - seed.shape[1]
-        share = nn.sigmoid(self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2])))[None]
+        learned = self.param("share", nn.initializers.zeros_init(), (later, seed.shape[2]))
+        share = nn.sigmoid(learned + _HELD * jnp.exp(-jnp.arange(later) / _LEAVING)[:, None])[None]
         centre = mean[None, None]
         way = jnp.cumsum(_SLOWING ** (1.0 + jnp.arange(later)))[None, :, None]
         held = seed[:, -1:] + way * (seed[:, -1:] - seed[:, -2:-1])
@@ -82,7 +85,7 @@ class PatchDiscriminator(nn.Module):
         self, motion: Float[Array, "B N D"], audio: Float[Array, "B N bands"], label: Float[Array, "B E"]
     ) -> tuple[Float[Array, "B _"], Float[Array, "B E"]]:
         moved = dense(self.channels)(motion)
-        sound = dense(self.channels)(audio) / audio.shape[-1] ** 0.5
+        sound = dense(self.channels)(audio)
         x, y = bent(moved + sound), bent(moved)
         for _ in range(_HALVINGS):
             x = bent(StridedConv1D(self.channels)(x))

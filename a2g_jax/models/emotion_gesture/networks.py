@@ -180,6 +180,8 @@ class Networks:
         fused = self._apply(params, "fusion", key, mixed)
         memory = self._apply(params, "encoder", key, fused)
         prompt = self._apply(params, "prompter", key, seed)
+        if self.config.query_audio:
+            prompt = prompt + memory
         made: Float[Array, "B N C"] = self._apply(params, "decoder", key, prompt, memory)
         if self.config.hold_seed:
             own = {"params": params["generator"]["hold"]}

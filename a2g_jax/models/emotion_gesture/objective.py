@@ -180,6 +180,9 @@ def discriminator_loss(networks: Networks, training: bool, sampled: bool = False
         real, shown = networks.judge(params, target, batch.audio, label)
         latent = _latent(networks, key, batch, sampled)
         fake, _ = networks.judge(params, *judged(networks, frozen, batch, audio, made, dropout, latent))
+        if config.mismatched:
+            other, _ = networks.judge(params, target, jnp.roll(batch.audio, 1, axis=0), label)
+            fake = jnp.concatenate([fake, other])
         terms = {"discriminator": losses.discriminator_adversarial(real, fake)}
         if shown is not None and config.shown_emotion_weight > 0:
             # Of recorded motion only, so that the classes are those of people.
