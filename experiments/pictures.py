@@ -1,8 +1,8 @@
-"""The pictures in the README: the demo; one generated sentence and five right motions; the page of the data.
+"""The pictures in the README: the demo and its emotions; one sentence and five right motions; the page of the data.
 
     python -m experiments.pictures [--out docs/pictures] [--seed 4]
 
-Needs playwright, Pillow and Chromium. Writes ``demo.png``, ``talker.png`` and ``talker_page.png``.
+Needs playwright, Pillow and Chromium. Writes ``demo.png``, ``emotions.png``, ``talker.png`` and ``talker_page.png``.
 """
 
 import argparse
@@ -93,11 +93,15 @@ def page_picture(path: Path, page: Path, time: float) -> None:
             _save(image.convert("RGB"), path)
 
 
-def demo_picture(path: Path, folder: Path, time: float) -> None:
-    """The page of ``a2g demo`` at a moment."""
-    if run_command(["demo", "--out", str(folder), "--formats", "html"]):
+def demo_picture(path: Path, folder: Path, time: float, flags: tuple[str, ...] = (), height: int = 800) -> None:
+    """The page of ``a2g demo`` at a moment.
+
+    Args:
+        flags: further ones of the command.
+    """
+    if run_command(["demo", *flags, "--out", str(folder), "--formats", "html"]):
         raise SystemExit("the demo failed")
-    screenshot_page(folder / "index.html", path, width=1280, height=800, time=time)
+    screenshot_page(folder / "index.html", path, width=1280, height=height, time=time)
     print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 
 
@@ -122,6 +126,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         demo_picture(options.out / "demo.png", Path(folder) / "demo", options.time)
+        demo_picture(options.out / "emotions.png", Path(folder) / "emotions", options.time, ("--emotions",), 620)
         for name, seconds in (("talker", SENTENCE), ("talker_page", 20.0)):
             recording = TalkRequest(seconds=seconds, seed=options.seed, fingers=True).recording()
             shown = list(right_motions(recording, 5, options.seed))
