@@ -67,8 +67,8 @@ class Checked:
 
     The wrapped sampler may have these attributes: ``stretches``, frames with bounds of their own
     (:class:`~a2g_jax.metrics.body.check.Stretch`), such as those of pinned clips; ``varies``, false if another seed
-    gives the same motion; ``remedy``, what a user can change about frames that are given. The reports of one that yields drafts (:class:`~a2g_jax.generation.drafts.Drafting`) are on
-    the motions that are kept.
+    gives the same motion; ``remedy``, what a user can change about frames that are given. The reports of one that
+    yields drafts (:class:`~a2g_jax.generation.drafts.Drafting`) are on the motions that are kept.
     """
 
     run: Run
@@ -100,9 +100,8 @@ class Checked:
             self.reports.append(report)
             if report.findings and (self.strict or report.findings[0].figure == "finite"):
                 remedy = self._remedy(kept, report.findings) + (", or leave --strict out" if self.strict else "")
-                raise InputError(
-                    f"sample {sample}: a body cannot do it, after {_times(report.draws)}: {report.findings[0]}; {remedy}."
-                )
+                what = f"a body cannot do it, after {_times(report.draws)}: {report.findings[0]}"
+                raise InputError(f"sample {sample}: {what}; {remedy}.")
             kept.record(sample, kept.motion)
             yield kept.motion
 
@@ -167,8 +166,8 @@ class Checked:
         return eased if fewer and not _worse(found, drawn.findings) else None
 
     def _helps(self, findings: Sequence[BodyFinding]) -> bool:
-        """Whether another draw can help: the motion of a pinned clip is the same in each. In transitions it helps: two in
-        five of them are good after up to three draws, since they depend on the drawn motion, too."""
+        """Whether another draw can help: the motion of a pinned clip is the same in each. Transitions depend on the
+        drawn motion, too: two in five of bad ones are good after up to three draws."""
         given = [(one.first, one.stop) for one in self.stretches if one.fixed]
         return getattr(self.sampler, "varies", True) and not all(_within(one, given) for one in findings)
 
