@@ -15,9 +15,9 @@ _TRAINING = {
     "tiny": replace(TRAIN_PRESETS["tiny"], batch_size=4),
 }
 
-#: The decoder learns how the person moves in the game with the discriminator. A minute is overfitted by a decoder of its
-#: own: its weights are averaged with those that it started from. Higher weights of the game calm the motion (4: hands
-#: stand still). The encoders stay, and so do the audio's z-scores.
+#: The decoder learns how the person moves in the game with the discriminator. Since it overfits a minute of motion, its
+#: weights are averaged with those that it started from. Higher weights of the game calm the motion (4: hands stand
+#: still). The encoders stay, and so do the audio's z-scores.
 _FINE_TUNING = FineTuning(
     TrainConfig(
         steps=300,
