@@ -67,6 +67,8 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
     audio = read_speech(options.audio, options.channel).at(trained.config.mel.sample_rate)
     chosen = clips.sampler_of(trained, audio, options)
-    sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **chosen.about)
+    parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))
+    about = {**chosen.about, "label": ", ".join(part for part in parts if part)}
+    sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **about)
     for line in chosen.report(Path(options.out)):
         print(line)

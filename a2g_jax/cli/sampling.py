@@ -1,6 +1,7 @@
 """Flags and output of the commands that generate motions with a run: ``a2g demo`` and ``a2g generate``."""
 
 import argparse
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,6 +76,17 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
 def control_flags(options: argparse.Namespace) -> list[str]:
     """``--control`` as flags of sampling settings."""
     return [part for text in options.control or () for part in ("--control", text)]
+
+
+def changed_settings(stored: Any, changed: Any) -> str:
+    """The sampling settings that differ from those of a run, without the controls, which every page names."""
+    found = []
+    for field in dataclasses.fields(changed) if changed is not None else ():
+        value = getattr(changed, field.name)
+        if field.name != "controls" and value != getattr(stored, field.name):
+            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+            found.append(f"{field.name.replace('_', ' ')} {shown}")
+    return ", ".join(found)
 
 
 def write_samples(

@@ -234,7 +234,7 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
     splits = official_splits([entry.frames for entry in entries], parts, plan.seed, groups)
     if not splits["train"]:
         raise InputError(f"{path}: no recordings for training; add some, or split by the seed (--random-split).")
-    _write_statistics(folder, entries, splits)
+    write_statistics(folder, entries, splits)
     files = [*ARRAYS, *([WAVEFORM] if features.waveform else []), "statistics.npz"]
     if plan.parts:
         write_json(folder / PARTS, plan.parts)
@@ -259,8 +259,8 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
     shutil.rmtree(work.folder, ignore_errors=True)
 
 
-def _write_statistics(folder: Path, entries: list[Entry], splits: Splits) -> None:
-    """Means and standard deviations over the training split only."""
+def write_statistics(folder: Path, entries: Sequence[Entry], splits: Splits) -> None:
+    """Write means and standard deviations of a corpus's arrays over its training split only."""
     values: dict[str, Any] = {}
     for name in ARRAYS:
         key = name.removesuffix(".npy")

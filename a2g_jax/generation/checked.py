@@ -1,6 +1,6 @@
 """Generation that checks every motion, and eases or draws it again where a body could not do it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -67,8 +67,8 @@ class Checked:
 
     The wrapped sampler may have these attributes: ``stretches``, frames with bounds of their own
     (:class:`~a2g_jax.metrics.body.check.Stretch`), such as those of pinned clips; ``varies``, false if another seed
-    gives the same motion. The reports of one that yields drafts (:class:`~a2g_jax.generation.drafts.Drafting`) are on
-    the motions that are kept.
+    gives the same motion; ``remedy``, what a user can change about frames that are given. The reports of one that
+    yields drafts (:class:`~a2g_jax.generation.drafts.Drafting`) are on the motions that are kept.
     """
 
     run: Run
@@ -99,10 +99,9 @@ class Checked:
             kept, report = self._check(audio, seed, sample, draft)
             self.reports.append(report)
             if report.findings and (self.strict or report.findings[0].figure == "finite"):
-                raise InputError(
-                    f"sample {sample}: a body cannot do it, after {_times(report.draws)}: {report.findings[0]}; use"
-                    f" another --seed or speech{', or leave --strict out' if self.strict else ''}."
-                )
+                remedy = self._remedy(kept, report.findings) + (", or leave --strict out" if self.strict else "")
+                what = f"a body cannot do it, after {_times(report.draws)}: {report.findings[0]}"
+                raise InputError(f"sample {sample}: {what}; {remedy}.")
             kept.record(sample, kept.motion)
             yield kept.motion
 
@@ -167,11 +166,22 @@ class Checked:
         return eased if fewer and not _worse(found, drawn.findings) else None
 
     def _helps(self, findings: Sequence[BodyFinding]) -> bool:
-        """Whether another draw can help: the motion of a pinned clip is the same in each."""
+        """Whether another draw can help: the motion of a pinned clip is the same in each. Transitions depend on the
+        drawn motion, too: two in five of bad ones are good after up to three draws."""
+        given = [(one.first, one.stop) for one in self.stretches if one.fixed]
+        return getattr(self.sampler, "varies", True) and not all(_within(one, given) for one in findings)
+
+    def _remedy(self, draft: Draft, findings: Sequence[BodyFinding]) -> str:
+        """What a user can do about the furthest finding."""
+        given = [(one.first, one.stop) for one in self.stretches if one.fixed]
+        own = str(getattr(self.sampler, "remedy", ""))
+        if own and _within(findings[0], given):
+            return own
         if not getattr(self.sampler, "varies", True):
-            return False
-        spans = [(one.first, one.stop) for one in self.stretches]
-        return not all(any(first <= one.first and one.stop <= stop for first, stop in spans) for one in findings)
+            return "use another speech, or other clips and settings"
+        if own and _within(findings[0], [*given, *draft.transitions]):
+            return f"{own}; or use another --seed"
+        return "use another --seed or speech"
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,6 +216,14 @@ def _worse(after: Sequence[BodyFinding], before: Sequence[BodyFinding]) -> bool:
         )
         for new in after
     )
+
+
+def _within(finding: BodyFinding, spans: Iterable[tuple[int, int]]) -> bool:
+    """Whether all frames of a finding lie in spans, which may touch."""
+    flags = np.zeros(finding.stop, bool)
+    for first, stop in spans:
+        flags[max(first, 0) : max(stop, 0)] = True
+    return bool(flags[finding.first :].all())
 
 
 def _same(one: Motion, other: Motion) -> bool:

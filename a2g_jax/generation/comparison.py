@@ -16,7 +16,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.compared_controls import with_controls
 from a2g_jax.generation.export import checked_figure
-from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
+from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Generator, audio_frames
 from a2g_jax.generation.talk.page import gesture_lane
 from a2g_jax.geometry.motion import Motion
@@ -30,9 +30,8 @@ from a2g_jax.viz.player import Figure, write_page
 
 #: Stem of the files of the talker's own motion.
 TALKER = "talker"
-#: The checks of all systems, and reports of earlier calls of other commands in the same folder.
+#: The checks of all systems.
 CHECKS = "checks.json"
-_REPORTS = r"(pins|checks|style)\.json"
 _FORMAT = "a2g_jax checks of systems"
 
 
@@ -162,7 +161,7 @@ def compare(
     }
     # This removes the talker's motion of an earlier speech, also where this one has none.
     stems = dict.fromkeys((*_stems_before(folder), "sample", TALKER, *runs))
-    files = {stem: MotionFiles(folder, stem, formats, _REPORTS) for stem in stems}
+    files = {stem: MotionFiles(folder, stem, formats, REPORTS) for stem in stems}
     figures = [] if speech.truth is None else [speech.truth]
     for name, made in motions.items():
         for number, motion in enumerate(made):

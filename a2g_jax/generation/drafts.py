@@ -26,6 +26,8 @@ class Draft:
     motion: Motion
     record: Record = _nothing
     """Adds the reports of all samplers that made it, on the motion that is kept of it."""
+    transitions: tuple[tuple[int, int], ...] = ()
+    """Frames from ``first`` to ``stop`` that lead to or from something given, such as a pinned clip."""
 
 
 @runtime_checkable

@@ -35,12 +35,14 @@ def ease(
     Args:
         findings: on the motion. Those on legs and on other figures remain, since they need another motion; so do frames
             too near a stretch for the correction to rise in between.
-        stretches: frames that stay as they are.
+        stretches: frames that stay as they are, where they are fixed.
     """
     reference = bounds.reference
     roles = {reference.skeleton.names[joint]: role for role, joint in reference.joints.items()}
     fixed = np.zeros(motion.frames, bool)
     for stretch in stretches:
+        if not stretch.fixed:
+            continue
         fixed[max(stretch.first, 0) : max(stretch.stop, 0)] = True
     found: dict[tuple[str, str], Bool[np.ndarray, " T"]] = {}
     for one in findings:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from a2g_jax.generation.checked import Checked
-from a2g_jax.generation.formats import PAGE, MotionFiles, check_page_size
+from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import make_folder, write_json
@@ -13,9 +13,6 @@ from a2g_jax.io.words import Word
 from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
-
-#: Reports of an earlier call, which belong to other motions.
-_REPORTS = r"(pins|checks|style)\.json"
 
 
 def export(
@@ -45,7 +42,8 @@ def export(
         audio: (N,), mono.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
-        label: description of the sampler, for the page's subtitle.
+        label: what the motions were made with, for the page's subtitle, which also names the run, requested controls
+            and pinned clips.
         lanes: further tracks of the page's timeline.
         report: called with the number of samples done: with ``strict`` once they are checked, else once written.
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
@@ -65,7 +63,7 @@ def export(
     if checked.strict:
         make_folder(out)  # a folder that cannot be used is refused before any work
         motions = list(_counted(motions, report))
-    files, figures, done = MotionFiles(out, "sample", formats, _REPORTS), [], 0
+    files, figures, done = MotionFiles(out, "sample", formats, REPORTS), [], 0
     try:
         for done, motion in enumerate(motions, start=1):
             files.write(done - 1, motion)
@@ -83,12 +81,20 @@ def export(
             audio,
             run.config.mel.sample_rate,
             title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-            subtitle=f"{run.config.model}, {run.config.preset} preset, {run.steps} training steps, seed {seed}"
-            + (f", {label}" if label else ""),
+            subtitle=_caption(checked, seed, label),
             words=words,
             lanes=lanes,
         )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
+
+
+def _caption(checked: Checked, seed: int, label: str) -> str:
+    """What the motions were made with."""
+    config = checked.run.config
+    parts = [f"{config.model}, {config.preset} preset, {checked.run.steps} training steps, seed {seed}"]
+    controls = " ".join(getattr(config.sampling_settings, "controls", ()))
+    parts += [controls, label, getattr(checked.sampler, "caption", "")]
+    return "; ".join(part for part in parts if part)
 
 
 def _counted(motions: Iterable[Motion], report: Callable[[int], None]) -> Iterator[Motion]:

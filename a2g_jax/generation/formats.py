@@ -40,6 +40,9 @@ MOTION_FORMATS: dict[str, MotionFormat] = {
 }
 #: The name of the page of all motions, which :func:`a2g_jax.viz.player.write_page` writes.
 PAGE = "html"
+#: Names of the reports of generation beside the motions, a regular expression: those of an earlier call belong to other
+#: motions.
+REPORTS = r"(pins|checks|style)\.json"
 #: Most joint positions that a page may hold: about 200 MB of HTML.
 _PAGE_LIMIT = 20_000_000
 

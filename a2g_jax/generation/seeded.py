@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,12 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clips import read_facing
-from a2g_jax.generation.generator import Generator
+from a2g_jax.generation.generator import Generator, plant_rotations
+from a2g_jax.generation.seed_bounds import REMEDY, seed_stretches
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
+from a2g_jax.metrics.body.check import Stretch
 from a2g_jax.training.run import Run
 
 
@@ -21,6 +25,17 @@ class Seeded:
 
     generator: Generator
     seed_poses: Float[np.ndarray, "S R D"]
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Bounds of the beginning."""
+        run = self.generator.run
+        return seed_stretches(run, plant_rotations(run, rotations_from_rows(self.seed_poses, run.config.space.kind)))
+
+    @property
+    def remedy(self) -> str:
+        """What changes the first frame."""
+        return REMEDY
 
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""

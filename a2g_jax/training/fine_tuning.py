@@ -55,6 +55,7 @@ def start_from(name: str | os.PathLike[str], run: Run) -> Start:
             pose_statistics=tuning.pose_statistics,
             audio_statistics=tuning.audio_statistics,
             keep_constant=tuning.keep_constant,
+            share=tuning.share,
         ),
     )
 

@@ -23,6 +23,7 @@ from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder, read_json, write_json
 from a2g_jax.models.base import Model, Params
 from a2g_jax.progress import say
+from a2g_jax.training.averaging import weight_average
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.early_stopping import ended, read_metrics, validations
@@ -36,6 +37,9 @@ from a2g_jax.training.validation import Validator, collect_summary
 
 #: Settings that may change on resuming, because the computation of a step does not depend on them.
 _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
+
+
+_Average = Callable[[Params], Params]
 
 
 class TrainingError(A2GError):
@@ -94,15 +98,17 @@ def train(
     state = init_state(model, spans, settings.seed, start)
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
     _check_folder(out, config, checkpoints, resume, corpus.on_demand)
-    if resume and (restored := checkpoints.restore(state)) is not None:
+    restored = checkpoints.restore(state) if resume else None
+    if restored is not None:
         state = restored
         config = keep_sampling(config, out)
     elif start is None and model.use_words is not None:
         state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
     config = replace(config, body_extremes=extremes)
-    export = partial(_export, config, model, corpus, out)
     make_folder(out)
+    average = weight_average(config.source, model.stages, start, out, restored is not None)
+    export = partial(_export, config, model, corpus, out, average)
     sweep_unfinished(checkpoints.folder)
     with (
         _stop_requested() as stop,
@@ -131,7 +137,7 @@ def train(
             else:
                 log.tick(done)
             if done % settings.validate_every == 0 or done in ends:
-                found = validate(state.params, span.stage)
+                found = validate(average(state.params), span.stage)
                 log.write_validation(done, found)
                 if found and span is spans[-1]:
                     checked = checked.after(done, found["loss"])
@@ -192,7 +198,10 @@ def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume
 
 def _without_name(source: Any) -> Any:
     """What a run records of its source without the name or path, which may change; the hash of the weights does not."""
-    return {key: value for key, value in source.items() if key != "run"} if isinstance(source, dict) else source
+    if not isinstance(source, dict):
+        return source
+    # Runs of an earlier version record no share.
+    return {"share": 1.0} | {key: value for key, value in source.items() if key != "run"}
 
 
 #: A whole step of training.
@@ -271,10 +280,10 @@ def _check_finite(state: TrainState, step: int, values: dict[str, float], checkp
     )
 
 
-def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, state: TrainState) -> Run:
+def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, average: _Average, state: TrainState) -> Run:
     """Write weights and the latent summary to the run folder, for generation."""
-    params = jax.device_get(state.params)
-    summary = collect_summary(model, state.params, corpus, config)
+    params = jax.device_get(average(state.params))
+    summary = collect_summary(model, params, corpus, config)
     run = Run(config, params, summary, int(state.step))
     save_run(out, run)
     return run

@@ -52,6 +52,7 @@ class Source:
     pose_statistics: str = "corpus"
     audio_statistics: str = "corpus"
     keep_constant: bool = False
+    share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

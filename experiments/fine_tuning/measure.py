@@ -1,13 +1,12 @@
-"""Statistics of motions for the held-out end of a take, and how far they are from the person's own."""
+"""Statistics of motions for held-out speech, and how far they are from the person's own."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from a2g_jax.geometry.motion import Motion
 from a2g_jax.metrics.liveliness import Body, body_of, hands_at_rest, wrist_jerk, wrist_speeds
-from experiments.motion.speeches import Speech
+from experiments.fine_tuning.takes import Spoken
 
 
 class Statistic(NamedTuple):
@@ -39,39 +38,44 @@ DESCRIBED: dict[str, Statistic] = {
 }
 
 
-def measure(motions: Sequence[Motion], speech: Speech) -> dict[str, float]:
-    """Statistics of all motions for one speech together; ``posture`` and the distance need the person's own.
+def measure(parts: Sequence[Spoken]) -> dict[str, float]:
+    """Statistics of all motions together; ``posture`` and the distance need the person's own.
 
     Args:
-        motions: one or more, at one frame rate.
+        parts: motions at one frame rate for one or more speeches.
     """
-    bodies = [body_of(motion) for motion in motions]
-    speed = np.concatenate([wrist_speeds(body).ravel() for body in bodies])
-    jerks = np.concatenate([wrist_jerk(body).ravel() for body in bodies])
-    wrists = np.concatenate([body.wrists for body in bodies])
-    scores = [speech.agreement(motion) for motion in motions]
+    bodies = [[body_of(motion) for motion in part.motions] for part in parts]
+    every = [body for group in bodies for body in group]
+    speed = np.concatenate([wrist_speeds(body).ravel() for body in every])
+    jerks = np.concatenate([wrist_jerk(body).ravel() for body in every])
+    wrists = np.concatenate([body.wrists for body in every])
+    scores = [part.speech.agreement(motion) for part in parts for motion in part.motions]
     found = {
         **{f"speed_p{share}": float(np.percentile(speed, share)) for share in (50, 90, 99)},
         **{f"jerk_p{share}": float(np.percentile(jerks, share)) for share in (50, 90)},
-        "rest": 100.0 * float(np.mean([hands_at_rest(body).mean() for body in bodies])),
+        "rest": 100.0 * float(np.concatenate([hands_at_rest(body) for body in every]).mean()),
         "height": 100.0 * float(wrists[..., 1].mean()),
-        "height_spread": 100.0 * float(np.mean([body.wrists[..., 1].std(axis=0).mean() for body in bodies])),
+        "height_spread": 100.0 * float(np.mean([body.wrists[..., 1].std(axis=0).mean() for body in every])),
         "radius": 100.0 * float(np.linalg.norm(wrists[..., [0, 2]], axis=-1).mean()),
         "agreement": float(np.mean([score.value - score.null_mean for score in scores])),
     }
-    if len(bodies) > 1:
-        pairs = [
-            np.linalg.norm(first.wrists - second.wrists, axis=-1).mean()
-            for number, first in enumerate(bodies)
-            for second in bodies[number + 1 :]
-        ]
+    pairs = [
+        np.linalg.norm(first.wrists - second.wrists, axis=-1).mean()
+        for group in bodies
+        for number, first in enumerate(group)
+        for second in group[number + 1 :]
+    ]
+    if pairs:
         found["between"] = 100.0 * float(np.mean(pairs))
     return found
 
 
-def posture_distance(motions: Sequence[Motion], person: Sequence[Motion]) -> float:
+def posture_distance(ours: Sequence[Spoken], person: Sequence[Spoken]) -> float:
     """Mean distance of the joints' mean places relative to the pelvis, cm, on one skeleton."""
-    places = [np.mean([_mean_pose(body_of(motion)) for motion in group], axis=0) for group in (motions, person)]
+    places = [
+        np.mean([_mean_pose(body_of(motion)) for part in parts for motion in part.motions], axis=0)
+        for parts in (ours, person)
+    ]
     return 100.0 * float(np.linalg.norm(places[0] - places[1], axis=-1).mean())
 
 

@@ -1,4 +1,4 @@
-"""What is compared on a take: the shipped weights, adapted z-scores, training from scratch, and fine-tuning."""
+"""What is compared on a part of a take: shipped weights, adapted z-scores, training from scratch, fine-tuning."""
 
 import time
 from collections.abc import Callable
@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from a2g_jax.io.files import read_json, write_json
+from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.fine_tuning import start_from, tuned_config, tuned_model, with_validation
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, open_run
 from a2g_jax.training.validation import collect_summary
-from experiments.fine_tuning.takes import TakeData
+from experiments.fine_tuning.takes import Fold
 
 
 class Made(NamedTuple):
@@ -22,34 +23,34 @@ class Made(NamedTuple):
     cpu_minutes: float
 
 
-#: ``method(name of the shipped run, take, seed, folder) -> Made``
-Method = Callable[[str, TakeData, int, Path], Made]
+#: ``method(name of the shipped run, fold, seed, folder) -> Made``
+Method = Callable[[str, Fold, int, Path], Made]
 
 
-def shipped(name: str, take: TakeData, seed: int, folder: Path) -> Made:
+def shipped(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     """The weights as they are."""
-    del take, seed, folder
+    del fold, seed, folder
     return Made(open_run(name), 0.0)
 
 
-def adapted(name: str, take: TakeData, seed: int, folder: Path) -> Made:
+def adapted(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     """Fine-tuning at step 0: the weights with the z-scores and the summary of the person."""
     del folder
     start = start_from(name, open_run(name))
-    config = tuned_config(start, *_tuned_settings(start.run, seed), take.corpus)
+    config = tuned_config(start, *_tuned_settings(start.run, seed), fold.corpus)
     model = tuned_model(config.build(), start.source)
-    corpus, _ = with_validation(take.corpus, model.clip_frames)
+    corpus, _ = with_validation(fold.corpus, model.clip_frames)
     return Made(Run(config, start.run.params, collect_summary(model, start.run.params, corpus, config), 0), 0.0)
 
 
-def fine_tuned(name: str, take: TakeData, seed: int, folder: Path) -> Made:
+def fine_tuned(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     """``a2g train MODEL --from NAME``, with its defaults."""
     start = start_from(name, open_run(name))
-    config = tuned_config(start, *_tuned_settings(start.run, seed), take.corpus)
-    return _timed(config, take, folder, start.run.params)
+    config = tuned_config(start, *_tuned_settings(start.run, seed), fold.corpus)
+    return _timed(config, fold, folder, start.run.params)
 
 
-def from_scratch(name: str, take: TakeData, seed: int, folder: Path) -> Made:
+def from_scratch(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     """The run's settings from initial weights, with as many steps; those of an own stage in their share of them."""
     run = open_run(name)
     steps = run.config.entry.fine_tuning.training.steps
@@ -60,8 +61,8 @@ def from_scratch(name: str, take: TakeData, seed: int, folder: Path) -> Made:
         settings = replace(settings, adversarial_steps=later)
     first = steps - later
     training = replace(training, steps=first, seed=seed, warmup_steps=first // 10, validate_every=10**6)
-    config = RunConfig.of(run.config.model, run.config.preset, settings, training, take.corpus)
-    return _timed(replace(config, sampling=run.config.sampling), take, folder, None)
+    config = RunConfig.of(run.config.model, run.config.preset, settings, training, fold.corpus)
+    return _timed(replace(config, sampling=run.config.sampling), fold, folder, None)
 
 
 METHODS: dict[str, Method] = {
@@ -70,6 +71,13 @@ METHODS: dict[str, Method] = {
     "from scratch": from_scratch,
     "fine-tuned": fine_tuned,
 }
+#: What of the settings of fine-tuning a method depends on; it is measured again when they change.
+SETTINGS: dict[str, Callable[[FineTuning], str]] = {
+    "shipped": lambda tuning: "",
+    "z-scores adapted alone": lambda tuning: repr(replace(tuning, training=TrainConfig())),
+    "from scratch": lambda tuning: str(tuning.training.steps),
+    "fine-tuned": repr,
+}
 
 
 def _tuned_settings(run: Run, seed: int) -> tuple[Any, TrainConfig]:
@@ -77,13 +85,13 @@ def _tuned_settings(run: Run, seed: int) -> tuple[Any, TrainConfig]:
     return replace(run.config.model_config, **tuning.settings), replace(tuning.training, seed=seed)
 
 
-def _timed(config: RunConfig, take: TakeData, folder: Path, start: Any) -> Made:
+def _timed(config: RunConfig, fold: Fold, folder: Path, start: Any) -> Made:
     """The trained run, resumed where it was interrupted; minutes of processor time of all attempts."""
     clock = folder.parent / f"{folder.name}.json"
     before = read_json(clock)["cpu_minutes"] if clock.is_file() else 0.0
     begun = time.process_time()
     try:
-        run = train(config, take.corpus, folder, resume=folder.is_dir(), progress=False, start=start)
+        run = train(config, fold.corpus, folder, resume=folder.is_dir(), progress=False, start=start)
     finally:
         spent = before + (time.process_time() - begun) / 60.0
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -2,17 +2,16 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
 
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import atomic_path
-from a2g_jax.training.run import load_run
-from a2g_jax.training.run_file import run_folder
+from a2g_jax.training.run import Run
 from experiments.fine_tuning.measure import STATISTICS
-from experiments.fine_tuning.takes import TakeData
+from experiments.fine_tuning.records import HELD_OUT, Campaign, Record
+from experiments.fine_tuning.takes import Fold
 from experiments.motion.resampling import smooth_resample
 from experiments.motion.rows import Row
 from experiments.motion.strips import film_strips
@@ -21,22 +20,21 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 _SHOWN = {"shipped": "#8d97a5", "from scratch": "#d98a29", "fine-tuned": "#2f6fe0"}
-_REFERENCE = "the person, first 80 %"
 #: Compared by differences, of which there is no ratio.
 _LEFT_OUT = ("rest", "posture")
 
 
-def draw(path: Path, records: Sequence[dict[str, Any]]) -> None:
-    """Write the ratio of every statistic to that of the person's first 80 %, a panel for each take."""
+def draw(path: Path, records: Sequence[Record]) -> None:
+    """Write the ratio of every statistic of all parts together to the person's, a panel for each take."""
     takes = list(dict.fromkeys(record["take"] for record in records))
     names = [name for name in STATISTICS if name not in _LEFT_OUT]
     figure, axes = plt.subplots(1, len(takes), figsize=(10.5, 3.6), sharey=True, squeeze=False)
     for axis, take in zip(axes[0], takes, strict=True):
         own = [record for record in records if record["take"] == take]
-        person = next(record["values"] for record in own if record["method"] == _REFERENCE)
+        person = next(record["pooled"] for record in own if record["method"] == HELD_OUT)
         axis.axvline(1.0, color="#1d2530", linewidth=1.2)
         for shift, (method, colour) in enumerate(_SHOWN.items()):
-            rows = [record["values"] for record in own if record["method"] == method]
+            rows = [record["pooled"] for record in own if record["method"] == method]
             for number, name in enumerate(names):
                 ratios = np.array([row[name] / person[name] for row in rows])
                 y = number + 0.22 * (shift - 1)
@@ -58,14 +56,15 @@ def draw(path: Path, records: Sequence[dict[str, Any]]) -> None:
     plt.close(figure)
 
 
-def strips(path: Path, run: str, take: TakeData, tuned: Path) -> None:
-    """Write film strips of the person, the shipped weights and the fine-tuned ones for the held-out speech.
+def strips(path: Path, fold: Fold, campaign: Campaign, seed: int) -> None:
+    """Write film strips of the person, the shipped weights and the fine-tuned ones for a held-out part.
 
     The person's motion is research-only data: keep the file to yourself.
     """
 
-    def row(name: str, folder: str | Path) -> Row:
-        made = Generator(load_run(folder)).generate(take.held_out.audio, 1, seed=0)
-        return Row(name, lambda number: [smooth_resample(made[0], take.corpus.fps)])
+    def row(name: str, run: Run) -> Row:
+        made = Generator(run).generate(fold.held_out.audio, 1, seed=0)
+        return Row(name, lambda number: [smooth_resample(made[0], fold.corpus.fps)])
 
-    film_strips(path, take.held_out, [row("shipped", run_folder(run)), row("fine-tuned", tuned)])
+    rows = [row(method, campaign.made(fold, method, seed).run) for method in ("shipped", "fine-tuned")]
+    film_strips(path, fold.held_out, rows)

@@ -1,6 +1,7 @@
 """Clips of styles and seed poses: brought into the range of training, matched by requests, continued, reported."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +15,7 @@ from a2g_jax.cli import main
 from a2g_jax.errors import InputError
 from a2g_jax.generation.stylized_flow.fit import fit
 from a2g_jax.generation.stylized_flow.into_range import Ranges, into_range
+from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.report import StyleTarget
 from a2g_jax.generation.stylized_flow.requests import as_quantiles, matching_requests
 from a2g_jax.generation.stylized_flow.seam import continued
@@ -153,6 +155,38 @@ def test_verdicts_have_absolute_bounds():
     # Where plain motion is near the clip already, near is followed, whatever the way.
     close = replace(target, plain=HandStyle(0.31, 0.82, 0.40))
     assert close.verdict(HandStyle(0.32, 0.85, 0.40)) == "followed"
+
+
+def test_a_style_is_judged_by_what_controls_request_in_its_place():
+    clip_hands = HandStyle(0.30, 0.80, 0.40)
+    target = StyleTarget(clip_hands, HandStyle(0.10, 0.40, 0.35), 3.0)
+    low = replace(target, requested=clip_hands._replace(height=-0.10))
+    made = HandStyle(-0.09, 0.78, 0.40)
+    assert target.verdict(made) != "followed"
+    assert low.verdict(made) == "followed"
+    assert low.verdict(clip_hands) != "followed"
+    assert low.to_json()["requested"]["height"] == -0.10
+    assert "requested" not in target.to_json()
+
+
+def test_hands_that_controls_and_a_clip_request_together():
+    own = FlowSpace.__new__(FlowSpace)
+    means = np.stack([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 3.0, 101)], axis=1)
+    own._names = ("height", "speed")
+    for lines, height, speed in (
+        ((), 0.3, 0.8),
+        (("height=0.9",), 0.9, 0.8),
+        (("energy=0.5",), 0.3, 2.0),
+        (("height=0.2@0,0.8@2",), 0.5, 0.8),
+    ):
+        settings = SimpleNamespace(controls=lines)
+        config = SimpleNamespace(sampling_settings=settings, fps=30.0)
+        own.run = SimpleNamespace(config=config, summary={"control_mean": means})
+        found = own.requested_hands(HandStyle(0.3, 0.8, 0.4), 61)
+        np.testing.assert_allclose(found, (height, speed, 0.4), atol=1e-6)
+    own._names = ("left_height", "right_height")
+    own.run.config.sampling_settings.controls = ("left_height=0.9",)
+    assert own.requested_hands(HandStyle(0.3, 0.8, 0.4), 61).height == pytest.approx(0.9)
 
 
 def test_clips_are_refused_by_name_with_the_figure():

@@ -12,7 +12,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
 from a2g_jax.generation.audio2gestures.pins import pin_codes
 from a2g_jax.generation.drafts import Draft, enter, recorded
-from a2g_jax.generation.pins.pinned import OF_CORPUS, OF_MOTIONS, jerk_limit, own_limit, pin_lane
+from a2g_jax.generation.pins.pinned import OF_CORPUS, OF_MOTIONS, jerk_limit, own_limit, pin_caption, pin_lane
 from a2g_jax.generation.pins.report import Ends, report_pins
 from a2g_jax.generation.pins.request import Pin, check_pins, read_pin
 from a2g_jax.geometry.motion import Motion
@@ -85,6 +85,11 @@ class Pinned:
         blend = round(self.request.blend * motion.fps)
         ends = Ends(blend, blend, blend)
         enter(self.reports, sample, report_pins(self.pins, motion, plain, limit, source, ends))
+
+    @property
+    def caption(self) -> str:
+        """The clips and their seconds, for a page's subtitle."""
+        return f"{pin_caption(self.pins)}, through their codes"
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""

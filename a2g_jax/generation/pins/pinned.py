@@ -86,7 +86,10 @@ class PinnedClips:
             if limit is None:
                 limit, source = own_limit([below.motion, *(pin.motion for pin in self.pins)]), OF_MOTIONS
             motion, placed = perform(below.motion, self.pins, self.standing, limit, self.length)
-            yield Draft(motion, partial(self._record, below, (limit, source), [one.ends for one in placed]))
+            spans = ((one.start, one.pin.first) for one in placed), ((one.pin.stop, one.stop) for one in placed)
+            transitions = tuple(span for part in spans for span in part if span[1] > span[0])
+            record = partial(self._record, below, (limit, source), [one.ends for one in placed])
+            yield Draft(motion, record, (*below.transitions, *transitions))
 
     def _record(self, below: Draft, limit: tuple[float, str], ends: list[Ends], sample: int, motion: Motion) -> None:
         below.record(sample, motion)
@@ -99,17 +102,35 @@ class PinnedClips:
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
-        """The clips, whose own extremes are allowed where they are higher than the bounds of the run: those of the
-        clips as they are performed, on their feet, not of the roots and legs in their files."""
+        """Those of the sampler, and the clips, whose own extremes are allowed where they are higher than the bounds of
+        the run: those of the clips as they are performed, on their feet, not of the roots and legs in their files."""
         bounds = self.run.config.body_bounds
-        return tuple(
+        own = tuple(
             Stretch(pin.first, pin.stop, bounds.loosened(standing, pin.name))
             for pin, standing in zip(self.pins, self.standing, strict=True)
         )
+        return (*getattr(self.sampler, "stretches", ()), *own)
+
+    @property
+    def remedy(self) -> str:
+        """What changes the motion in the clips, which another seed does not."""
+        own = "pin another clip, another part of it or at another second (FILE@SECOND+LENGTH), or set --pin-blend"
+        below = getattr(self.sampler, "remedy", "")
+        return f"{own}; {below}" if below else own
+
+    @property
+    def caption(self) -> str:
+        """The clips and their seconds, for a page's subtitle."""
+        return pin_caption(self.pins)
 
     def lane(self) -> "Track":
         """The pinned stretches as a lane of the page's timeline."""
         return pin_lane(self.pins)
+
+
+def pin_caption(pins: Sequence[Pin]) -> str:
+    """Clips and their seconds in words."""
+    return "pinned " + ", ".join(f"{Path(pin.name).name} at {pin.start:g} s" for pin in pins)
 
 
 def pin_lane(pins: Sequence[Pin]) -> "Track":

@@ -112,7 +112,10 @@ def pin_of(
             reasons.insert(0, f"has joints that people do not have ({', '.join(animal[:2])}); is it an animal?")
         raise InputError(f"{text}: {' It also '.join(reasons)}")
     if fit.travel > _TRAVEL:
-        notes.append(f"its path of {fit.travel:.1f} m along the floor is not kept: the body stays where it stands")
+        notes.append(
+            f"its path of {fit.travel:.1f} m along the floor is not kept: the body stays where it stands, and steps are"
+            " taken on the spot, so feet that stood may be reported as sliding"
+        )
     if fit.jerk_p99 > _SHAKY:
         notes.append(f"its own hands shake (99th percentile of jerk {fit.jerk_p99:.0f} m/s3): filter it at the source")
     return Pin(name, start, motion, turned, tuple(notes), fit)

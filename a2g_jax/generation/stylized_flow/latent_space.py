@@ -22,6 +22,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
+from a2g_jax.metrics.style import HandStyle
 from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.training.run import Run
 
@@ -317,9 +318,32 @@ class FlowSpace:
         """Quantiles of the controls: those of the sampling settings, elsewhere the style's."""
         if style.requests is None:
             return None
-        curves = parse_curves(self.run.config.sampling_settings.controls, self._names)
-        requested = sampled(curves, 0, frames, self.run.config.fps)
+        requested = self._controlled(frames)
         return np.where(np.isnan(requested), style.requests, requested).astype(np.float32)
+
+    def _controlled(self, frames: int) -> Float[np.ndarray, "T K"]:
+        """Quantiles of the sampling settings' controls, NaN where there is none."""
+        curves = parse_curves(self.run.config.sampling_settings.controls, self._names)
+        return sampled(curves, 0, frames, self.run.config.fps)
+
+    def requested_hands(self, clip: HandStyle, frames: int) -> HandStyle:
+        """Mean hands that a style and the sampling settings' controls request together.
+
+        Args:
+            clip: hands of the style's clip, which hold for what no control requests.
+        """
+        if not self._names:
+            return clip
+        training, quantiles = np.asarray(self.run.summary["control_mean"]), self._controlled(frames)
+        found: dict[str, list[float]] = {}
+        for column, name in enumerate(self._names):
+            # Some runs have a height of each hand.
+            field = name.rpartition("_")[2]
+            if field in clip._fields and not np.isnan(quantiles[:, column]).all():
+                values = np.quantile(training[:, column], np.nan_to_num(quantiles[:, column]))
+                own = np.where(np.isnan(quantiles[:, column]), getattr(clip, field), values)
+                found.setdefault(field, []).append(float(own.mean()))
+        return clip._replace(**{field: float(np.mean(values)) for field, values in found.items()})
 
     def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
         """The last poses, as many as are in the conditioning of a frame."""

@@ -29,26 +29,34 @@ class Verdict:
 
 @dataclass(frozen=True)
 class StyleTarget:
-    """Hands of a clip, and those of plain motion for the speech."""
+    """Hands of a clip, those that are requested, and those of plain motion for the speech."""
 
     clip: HandStyle
     plain: HandStyle
     top_speed: float
     """Of the faster hand, m/s: the higher one of the clip's and the plain motion's."""
+    requested: HandStyle | None = None
+    """Hands of the clip with what other controls request in place of it; None for the clip's."""
+
+    @property
+    def goal(self) -> HandStyle:
+        """The hands that motion is judged by."""
+        return self.clip if self.requested is None else self.requested
 
     def to_json(self) -> dict[str, Any]:
         """As JSON values."""
-        return {"clip": self.clip._asdict(), "plain": self.plain._asdict(), "top_speed": self.top_speed}
+        found = {"clip": self.clip._asdict(), "plain": self.plain._asdict(), "top_speed": self.top_speed}
+        return found if self.requested is None else {**found, "requested": self.requested._asdict()}
 
     def way(self, made: HandStyle) -> float:
-        """Share of the way from plain motion to the clip that motion went, a projection in units of :data:`NEAR`."""
-        aim, went = ((np.array(end) - np.array(self.plain)) / np.array(NEAR) for end in (self.clip, made))
+        """Share of the way from plain motion to the goal that motion went, a projection in units of :data:`NEAR`."""
+        aim, went = ((np.array(end) - np.array(self.plain)) / np.array(NEAR) for end in (self.goal, made))
         return float(aim @ went / max(float(aim @ aim), 1e-9))
 
     def verdict(self, made: HandStyle) -> str:
-        """Followed: height, speed and radius are all near the clip's. In part: two of them are, or motion went at least
+        """Followed: height, speed and radius are all near the goal's. In part: two of them are, or motion went at least
         half of the way, and no more than half as far again."""
-        near = int(np.sum(np.abs(np.array(made) - np.array(self.clip)) <= np.array(NEAR)))
+        near = int(np.sum(np.abs(np.array(made) - np.array(self.goal)) <= np.array(NEAR)))
         if near == len(made):
             return Verdict.FOLLOWED
         return Verdict.PARTLY if near == 2 or PARTLY[0] <= self.way(made) <= PARTLY[1] else Verdict.NOT
@@ -76,8 +84,9 @@ class StyleReport:
     def describe(self, target: StyleTarget) -> str:
         """A line for the terminal."""
         rough = f", ROUGH: {self.top_speed:.1f} m/s" if self.rough else ""
+        whose = "the clip's" if target.requested is None else "requested by the clip and --control"
         return (
-            f"hands {_words(self.hands)}, the clip's {_words(target.clip)}: {self.way:.0%} of the way,"
+            f"hands {_words(self.hands)}, {whose} {_words(target.goal)}: {self.way:.0%} of the way,"
             f" {self.verdict}{rough}; agreement with the speech {self.agreement:.2f} (shifted"
             f" {self.agreement_shifted:.2f})"
         )

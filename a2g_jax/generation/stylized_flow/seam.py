@@ -5,11 +5,11 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.generation.pins.offsets import Shape, decay, offset_vectors, turned
+from a2g_jax.generation.seed_bounds import PASSAGE
 from a2g_jax.geometry.motion import Motion
 
-#: Seconds in which the posture of a clip passes into that of the motion, and in which the difference of their speeds
-#: does.
-_PASSAGE, _SETTLING = 1.5, 0.5
+#: Seconds in which the difference of the speeds of a clip and the motion passes.
+_SETTLING = 0.5
 
 
 def continued(rotations: Float[np.ndarray, "T J 3 3"], clip: Motion) -> Float[np.ndarray, "T J 3 3"]:
@@ -31,6 +31,6 @@ def continued(rotations: Float[np.ndarray, "T J 3 3"], clip: Motion) -> Float[np
     back = [Rotation.from_rotvec(-count * step.as_rotvec()) * first for count in (1, 2)]
     motion = np.stack([one.as_matrix() for one in back])
     offsets = offset_vectors(np.asarray(clip.rotations[-2:], np.float64)[::-1], motion)
-    passage = decay(offsets, Shape(round(_PASSAGE * clip.fps), round(_SETTLING * clip.fps)))[: len(rotations)]
+    passage = decay(offsets, Shape(round(PASSAGE * clip.fps), round(_SETTLING * clip.fps)))[: len(rotations)]
     begun = turned(np.asarray(rotations[: len(passage)], np.float64), passage)
     return np.concatenate([begun.astype(np.float32), rotations[len(passage) :]])

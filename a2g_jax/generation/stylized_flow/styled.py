@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +12,15 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clips import read_motion
 from a2g_jax.generation.drafts import Draft, enter, recorded
-from a2g_jax.generation.generator import speech_features
+from a2g_jax.generation.generator import plant_rotations, speech_features
+from a2g_jax.generation.seed_bounds import REMEDY, seed_stretches
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.generation.stylized_flow.report import StyleReport, StyleTarget, hands_of, report_style
 from a2g_jax.generation.stylized_flow.style import Style, blend
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
+from a2g_jax.metrics.body.check import Stretch
 from a2g_jax.metrics.style import HandStyle
 from a2g_jax.training.run import Run
 
@@ -140,6 +142,19 @@ class Styled:
     _matched: list[tuple[bytes, Style, StyleTarget | None]] = field(default_factory=list)
     """The last speech, its style with requests, and the target of reports."""
 
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Bounds of the beginning of motions that continue a clip."""
+        if self.seed_poses is None:
+            return ()
+        run = self.space.run
+        return seed_stretches(run, plant_rotations(run, np.asarray(self.seed_poses.motion.rotations)))
+
+    @property
+    def remedy(self) -> str:
+        """What changes the first frame of motions that continue a clip."""
+        return "" if self.seed_poses is None else REMEDY
+
     def stream(self, audio: Float[np.ndarray, " N"], samples: int, seed: int = 0) -> Iterator[Motion]:
         """Yield samples one after another."""
         return recorded(self.drafts(audio, samples, seed))
@@ -167,7 +182,9 @@ class Styled:
             found = [hands for hands in without if hands is not None]
             if found:
                 hands = HandStyle(*np.mean([style for style, _ in found], axis=0).tolist())
-                target = StyleTarget(self.target[0], hands, max(self.target[1], *(top for _, top in found)))
+                requested = self.space.requested_hands(self.target[0], len(features))
+                controlled = None if requested == self.target[0] else requested
+                target = StyleTarget(self.target[0], hands, max(self.target[1], *(top for _, top in found)), controlled)
         self._matched[:] = [(key, self.space.match(style, features, plain), target)]
         return self._matched[0][1:]
 

@@ -68,6 +68,8 @@ class Stretch:
     first: int
     stop: int
     bounds: BodyBounds
+    fixed: bool = True
+    """Whether the motion in these frames is given, so that nothing may change it."""
 
 
 def check_motion(
