@@ -11,3 +11,7 @@ class Interrupted(A2GError):
 
 class InputError(A2GError, ValueError):
     """A file or value that cannot be used: the message names it, the place in it and the fix."""
+
+
+class OutputError(InputError):
+    """A place that cannot be written to: a full or read-only disk, or missing permissions."""
