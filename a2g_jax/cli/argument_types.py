@@ -7,6 +7,12 @@ from typing import Any
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import chosen_formats
 
+#: Help on ``--verify``.
+VERIFY = (
+    "read all files of the corpus to compare them with their hashes, also those whose size and times are as they were"
+    " when they were last read"
+)
+
 
 def number(kind: Callable[[str], Any], low: float | int, high: float | int, meaning: str) -> Callable[[str], Any]:
     """An argument type for numbers from ``low`` to ``high``.

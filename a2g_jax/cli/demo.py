@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.cli import sampling
-from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.errors import InputError
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
@@ -50,6 +50,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         raise InputError("--train and --compare exclude each other; train first, then name the run: --compare RUN.")
     options.out = options.out or ("comparison" if comparing else "demo")
     options.samples = options.samples or (COMPARED_SAMPLES if comparing else sampling.SAMPLES)
+    writable_folder(options.out)
     (_compare if comparing else _demo)(options)
 
 

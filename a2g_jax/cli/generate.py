@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from a2g_jax.cli import clips, sampling
-from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
 
@@ -50,6 +50,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     clips.check_flags(options, extra)
     existing_file(options.audio)
     clips.check_files(options)
+    writable_folder(options.out)
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.io.audio import read_audio

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32, Int64
@@ -27,6 +26,8 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import check_readable, parse_json
 from a2g_jax.io.sealed import read_sealed
 from a2g_jax.io.stored_array import StoredArray
+from a2g_jax.io.untrusted import Limits
+from a2g_jax.io.untrusted.numpy_files import read_npz_file
 
 #: Entries of manifests that have a checksum.
 SEALED_WITH = ("annotations",)
@@ -303,17 +304,17 @@ class Corpus:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """``audio`` (width,), ``pose`` (R, D) and ``root`` (3,), over the training split only."""
-        path = self.path / "statistics.npz"
+        path, names = self.path / "statistics.npz", ("audio", "pose", "root")
         try:
-            with np.load(io.BytesIO(self._bytes(path.name, self.hashes.get(path.name)))) as arrays:
-                return {
-                    name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"])
-                    for name in ("audio", "pose", "root")
-                }
-        except InputError:
-            raise
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-            raise InputError(f"{path}: cannot be read ({error}); prepare the corpus anew.") from None
+            data = self._bytes(path.name, self.hashes.get(path.name))
+            keys = [f"{name}_{part}" for name in names for part in ("mean", "std")]
+            arrays = read_npz_file(io.BytesIO(data), str(path), keys, limits=Limits(size=2**26))
+        except InputError as error:
+            if str(error) == differs(path):
+                raise
+            reason = str(error).removeprefix(f"{path}").lstrip(":, ").rstrip(".")
+            raise InputError(f"{path}: cannot be read ({reason}); prepare the corpus anew.") from None
+        return {name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"]) for name in names}
 
     def segments(self, split: str) -> list[Segment]:
         """The stretches of a split, as rows of the arrays.

@@ -13,13 +13,14 @@ from a2g_jax.inspection.runs import inspect_run
 from a2g_jax.training.run_file import RUN_FILE, SHIPPED
 
 
-def inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None = None) -> Report:
+def inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None = None, verify: bool = False) -> Report:
     """Facts about a file, a folder of recordings, a corpus or a run, and its likely faults.
 
     Args:
         name: path of the file or folder, or the name of a run that comes with the package: ``"demo"`` or
             ``"demo-flow"``. ``"./demo"`` is a folder of that name.
         audio: the speech that belongs to a motion or a transcript.
+        verify: read all files of a corpus to compare their hashes, also those that seem unchanged since last time.
 
     Raises:
         InputError: no such file or folder, or one of an unknown kind.
@@ -32,7 +33,7 @@ def inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None =
         if name in SHIPPED:
             return inspect_run(name)
         if (path / MANIFEST).exists():
-            return inspect_corpus(path)
+            return inspect_corpus(path, verify)
         if (path / RUN_FILE).exists():
             return inspect_run(path)
         return inspect_folder(path)

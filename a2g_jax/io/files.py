@@ -100,7 +100,7 @@ def unwritable(path: str | os.PathLike[str], error: BaseException, remedy: str =
 
 
 def disk_full(error: BaseException | None) -> bool:
-    """Whether an error or one of its causes says that nothing more can be written: a full or read-only disk, a quota."""
+    """Whether an error or one of its causes says that nothing can be written: a full or read-only disk, a quota."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _FULL:
             return True

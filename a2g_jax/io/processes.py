@@ -4,6 +4,7 @@ import hashlib
 import os
 import socket
 import sys
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -45,15 +46,13 @@ def this_process() -> Process:
 def host_digits() -> str:
     """Digits for this host; containers that share a host name have others."""
     space = ""
-    try:
+    with suppress(OSError):
         space = os.readlink("/proc/self/ns/pid")  # noqa: PTH115 - a name, not a path
-    except OSError:
-        pass
     return hashlib.sha256(f"{socket.gethostname()} {space}".encode()).hexdigest()[:8]
 
 
 def started(pid: int) -> str:
-    """When a process was started, as hexadecimal digits; empty where the system does not say or there is no such one."""
+    """When a process was started, as hexadecimal digits; empty without such a process, or where nothing says."""
     try:
         # The name of the program, in brackets, may contain anything.
         after = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2]
