@@ -118,12 +118,14 @@ def check_folder_writable(path: str | os.PathLike[str]) -> None:
         OutputError: nothing can be written there.
     """
     path = Path(path)
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r}: is not a usable path; check its characters.")
     try:
-        place = Path(os.path.abspath(path))  # noqa: PTH100 - links stay
+        whole = place = Path(os.path.abspath(path))  # noqa: PTH100 - links stay
         while not os.path.lexists(place) and place != place.parent:
             place = place.parent
         if not place.is_dir():
-            raise InputError(f"{path}: {'is' if place.samefile(path) else f'{place} is'} a file; name a folder.")
+            raise InputError(f"{path}: {'is' if place == whole else f'{place} is'} a file; name a folder.")
         probe = temporary_path(place / "probe")
         try:
             probe.write_bytes(b"a")
@@ -131,10 +133,6 @@ def check_folder_writable(path: str | os.PathLike[str]) -> None:
             probe.unlink(missing_ok=True)
     except OSError as error:
         raise unwritable(path, error) from None
-    except ValueError as error:  # a null character in the path
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{str(path)!r}: is not a usable path; check its characters.") from None
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -81,7 +81,7 @@ def read_npz(
 
 
 def read_npz_file(
-    file: BinaryIO,
+    file: BinaryIO | io.BytesIO,
     path: str,
     names: Sequence[str] | None = None,
     *,
@@ -196,7 +196,7 @@ def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[in
 class _SmallReads(io.RawIOBase):
     """A file that refuses large reads, such as those of ``zipfile`` for the sizes that a file claims."""
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: BinaryIO | io.BytesIO) -> None:
         self.file = file
 
     def readable(self) -> bool:
