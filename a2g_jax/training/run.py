@@ -96,7 +96,8 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
 
     folder = Path(folder)
     about, weights = folder / RUN_FILE, folder / WEIGHTS_FILE
-    read_description(folder)  # what is no run is refused as that
+    if not about.is_file():
+        read_description(folder)  # which says that it is no run
     data, values = read_weights(folder)
     try:
         arrays = load(data)
