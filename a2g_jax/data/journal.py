@@ -104,16 +104,17 @@ class Unfinished:
             self._samples,
             0 if item.waveform is None else len(item.waveform),
         )
+        digest = sha256_file(annotations)
         value = {
             "entry": asdict(entry),
             "rows": hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest(),
-            "annotations": sha256_file(annotations),
+            "annotations": digest,
             "spread": self.spread,
             "body": None if self.entries else body_to_json(item.body),
         }
         self._write_line(value)
         self.entries.append(entry)
-        self.annotation_hashes.append(value["annotations"])
+        self.annotation_hashes.append(digest)
 
     def skip(self, item: Skipped) -> None:
         """Note a recording that cannot be prepared; it is tried again once one of its files has changed."""

@@ -10,7 +10,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.evaluation.emotion_tables import emotion_lines, emotions_picture
 from a2g_jax.evaluation.report_notes import condition, notes, preface
 from a2g_jax.evaluation.scores import METRICS, Metric
-from a2g_jax.io.files import read_json
+from a2g_jax.io.files import atomic_path, read_json
 from a2g_jax.io.staging import staged
 from a2g_jax.metrics.units import find_units
 

@@ -60,7 +60,7 @@ class StoredArray:
             InputError: the file was changed since it was opened, or cannot be read.
         """
         rows = np.empty((max(stop - start, 0), *self.shape[1:]), self.dtype)
-        view = memoryview(rows.reshape(-1).view(np.uint8)) if rows.size else memoryview(b"")
+        view = rows.reshape(-1).view(np.uint8).data if rows.size else memoryview(b"")
         at, done = self._start + start * self._row, 0
         try:
             status = os.fstat(self._file.fileno())
