@@ -31,19 +31,21 @@ def campaign(inputs: Inputs, cache: Path, number: int, seed: int) -> dict[str, d
         place = cache / f"damage {subject} {seed}.json"
         rows: list[list[str]] = read_json(place) if place.is_file() else []
         work = cache / f"damaged {subject}"
+        if len(rows) < number:
+            shutil.rmtree(work, ignore_errors=True)
+            shutil.copytree(folder, work)
+            use(work)  # as it is, it can be used
         for count in range(len(rows), number):
-            rows.append(_one(folder, work, use, np.random.default_rng([seed, count])))
+            rows.append(_one(work, use, np.random.default_rng([seed, count])))
             if count % 20 == 19 or count == number - 1:
+                use(work)
                 write_json(place, rows)
         found[subject] = {kind: dict(Counter(row[1] for row in rows[:number] if row[0] == kind)) for kind in KINDS}
     return found
 
 
-def _one(folder: Path, work: Path, use: Callable[[Path], None], rng: np.random.Generator) -> list[str]:
+def _one(work: Path, use: Callable[[Path], None], rng: np.random.Generator) -> list[str]:
     """Kind of damage, outcome, file and message."""
-    if not work.is_dir():
-        shutil.copytree(folder, work)
-    use(work)  # as it is, it can be used
     files = sorted(path for path in work.rglob("*") if path.is_file() and path.stat().st_size)
     sizes = np.array([path.stat().st_size for path in files], float)
     # Half of the places are uniform over bytes, half over files.
@@ -59,7 +61,7 @@ def _one(folder: Path, work: Path, use: Callable[[Path], None], rng: np.random.G
         changed = data[:at]
     name = path.relative_to(work).as_posix()
     if changed == data:  # zeros on zeros
-        return _one(folder, work, use, rng)
+        return _one(work, use, rng)
     path.write_bytes(changed)
     try:
         use(work)
