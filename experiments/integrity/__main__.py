@@ -45,6 +45,8 @@ def table(found: dict[str, dict[str, dict[str, int]]], rows: list[dict[str, Any]
             counts = kinds[kind]
             cells = " | ".join(str(counts.get(outcome, 0)) for outcome in outcomes)
             lines.append(f"| {subject}, {kind} | {sum(counts.values())} | {cells} |")
+    if not rows:
+        return "\n".join([*lines, ""])
     lines += [
         "",
         "SIGKILL at random moments; the same command is repeated until it finishes, and its files are compared with"
