@@ -13,5 +13,9 @@ class InputError(A2GError, ValueError):
     """A file or value that cannot be used: the message names it, the place in it and the fix."""
 
 
+class OutputError(InputError):
+    """A place that cannot be written to: a full or read-only disk, or missing permissions."""
+
+
 class InputWarning(UserWarning):
     """A file that can be used, with a doubt; the command line prints one as a single line and goes on."""

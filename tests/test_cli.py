@@ -343,5 +343,5 @@ def test_settings_are_explained(capsys):
 def test_a_damaged_description_of_a_run_is_named(capsys, tmp_path, damage):
     values = json.loads((Path(a2g_jax.__file__).parent / "demo" / "run.json").read_text(encoding="utf-8"))
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "run.json").write_text(json.dumps({**values, **damage}))
+    (tmp_path / "run" / "run.json").write_text(json.dumps({**values, "checksum": None, **damage}))
     assert str(tmp_path / "run" / "run.json") in fails(capsys, "generate", str(tmp_path / "run"), "--settings")

@@ -12,6 +12,12 @@ from a2g_jax.io.reading import parse_channel
 CHANNEL = "channel of audio files with several (default: the mean of all)"
 TIER = "tier of TextGrids with several, or the speaker it is of (default: the first tier of words)"
 
+#: Help on ``--verify``.
+VERIFY = (
+    "read all files of the corpus to compare them with their hashes, also those whose size and times are as they were"
+    " when they were last read"
+)
+
 
 def number(kind: Callable[[str], Any], low: float | int, high: float | int, meaning: str) -> Callable[[str], Any]:
     """An argument type for numbers from ``low`` to ``high``.

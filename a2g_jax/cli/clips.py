@@ -176,8 +176,13 @@ def _in_codes(run: "Run", audio: Any, options: argparse.Namespace) -> "Pinned":
 
 def _pin_corpus(options: argparse.Namespace) -> "Corpus | None":
     from a2g_jax.data.corpus import Corpus
+    from a2g_jax.data.corpus_integrity import verify_corpus
 
-    return None if options.pin_corpus is None else Corpus.open(options.pin_corpus)
+    if options.pin_corpus is None:
+        return None
+    corpus = Corpus.open(options.pin_corpus)
+    verify_corpus(corpus)
+    return corpus
 
 
 def _pinned(pinned: "PinnedClips | Pinned", below: Chosen) -> Chosen:

@@ -7,7 +7,7 @@ from typing import Any
 
 from a2g_jax.cli import sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
-from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.cli.speech import read_speech
 from a2g_jax.errors import InputError
 
@@ -72,6 +72,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     }.get("".join(chosen), ("demo", sampling.SAMPLES, _demo))
     options.out = options.out or page
     options.samples = options.samples or samples
+    writable_folder(options.out)
     command(options)
 
 

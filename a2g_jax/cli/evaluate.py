@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from a2g_jax.cli.argument_types import count, seed
-from a2g_jax.cli.paths import existing_corpus, existing_features, existing_report, existing_run
+from a2g_jax.cli.argument_types import VERIFY, count, seed
+from a2g_jax.cli.paths import existing_corpus, existing_features, existing_report, existing_run, writable_folder
 from a2g_jax.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--split", default="test", help="split of the corpus (default: test)")
     parser.add_argument("--samples", type=count, default=20, help="motions of each run for each clip (default: 20)")
+    parser.add_argument("--verify", action="store_true", help=VERIFY)
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
 
 
@@ -70,15 +71,15 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     if "classifiers" in result:
         from a2g_jax.evaluation import confusion_report
 
-        written = confusion_report.write_confusion(result, Path(options.out))
         print(confusion_report.markdown(result))
+        written = confusion_report.write_confusion(result, Path(options.out))
         print(f"{options.out}: {', '.join(path.name for path in written)}")
         return
 
     from a2g_jax.evaluation.report import markdown, write_report
 
-    written = write_report(result, Path(options.out))
     print(markdown(result))
+    written = write_report(result, Path(options.out))
     print(f"{options.out}: {', '.join(path.name for path in written)}")
 
 
@@ -92,9 +93,11 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
     existing_corpus(options.corpus)
     existing_features(options.features)
     existing_run(options.emotion_classifier, ())
+    writable_folder(options.out)
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.data.corpus import Corpus
+    from a2g_jax.data.corpus_integrity import verify_corpus
     from a2g_jax.evaluation.confusion import classify_split, is_classifier
     from a2g_jax.evaluation.emotion_judge import load_emotion_judge
     from a2g_jax.evaluation.evaluate import evaluate
@@ -109,6 +112,7 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
     keep_compilations()
     runs: dict[str, Run] = {name: open_run(name) for name in options.runs}
     corpus = Corpus.open(options.corpus)
+    verify_corpus(corpus, options.verify)
     if any(is_classifier(run) for run in runs.values()):
         for flag in ("features", "emotion_classifier", "audit", "metric"):
             if getattr(options, flag):

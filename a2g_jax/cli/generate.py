@@ -6,7 +6,7 @@ from pathlib import Path
 
 from a2g_jax.cli import clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
-from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.cli.speech import read_speech
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
@@ -57,6 +57,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     clips.check_flags(options, extra)
     existing_file(options.audio)
     clips.check_files(options)
+    writable_folder(options.out)
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.training.run import open_run

@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from a2g_jax.cli.argument_types import CHANNEL, TIER, channel
-from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.cli.argument_types import CHANNEL, TIER, VERIFY, channel
+from a2g_jax.cli.paths import existing_file, existing_run, writable_file
 from a2g_jax.errors import InputError
 from a2g_jax.io.reading import reading
 from a2g_jax.training.run_file import SHIPPED
@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channel", type=channel, metavar="left|right|N", help=CHANNEL)
     parser.add_argument("--tier", metavar="NAME", help=TIER)
     parser.add_argument("--json", action="store_true", help="print one JSON document")
+    parser.add_argument("--verify", action="store_true", help=VERIFY)
     parser.add_argument("--strict", action="store_true", help="exit with status 1 if there are warnings")
 
 
@@ -66,7 +67,7 @@ def _inspect(options: argparse.Namespace) -> "Report":
 
     from a2g_jax.inspection.inspect import inspect
 
-    return inspect(options.path, options.audio, channel=options.channel, tier=options.tier)
+    return inspect(options.path, options.audio, options.verify, channel=options.channel, tier=options.tier)
 
 
 def _score(options: argparse.Namespace) -> "Report":
@@ -78,6 +79,7 @@ def _score(options: argparse.Namespace) -> "Report":
     existing_run(options.path)
     existing_file(options.score)
     existing_file(options.audio)
+    writable_file(options.picture)
 
     from a2g_jax.inspection.likelihood import file_likelihood, likelihood_report
 

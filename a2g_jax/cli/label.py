@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from a2g_jax.cli.argument_types import count, natural
-from a2g_jax.cli.paths import existing_file, existing_folder, existing_run
+from a2g_jax.cli.paths import existing_file, existing_folder, existing_run, writable_file
 from a2g_jax.cli.prepare import reader_name
 from a2g_jax.errors import InputError
 
@@ -44,12 +44,13 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         existing_file(options.reader, "name a Python file that defines DATASET")
     existing_folder(options.source)
     existing_run(options.classifier, ())
+    out = Path(options.out) if options.out else Path(options.source) / "emotions.csv"
+    writable_file(str(out))
 
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.evaluation.emotion_labels import label_data_set, load_audio_classifier
 
     keep_compilations()
-    out = Path(options.out) if options.out else Path(options.source) / "emotions.csv"
     counts = label_data_set(
         options.reader,
         options.source,

@@ -85,6 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             raise
         status, line = _explain(error)
+        try:
+            sys.stdout.flush()
+        except OSError:  # a full disk; Python would complain again at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"a2g: {' '.join(line.split())}", file=sys.stderr)
         return status
 
@@ -110,6 +114,6 @@ def _explain(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError):
         return (
             2,
-            f"{error.filename or 'a file'}: cannot be used ({error.strerror or error}); check path and free space.",
+            f"{error.filename or 'the output'}: cannot be used ({error.strerror or error}); check path and free space.",
         )
     return 1, f"unexpected {type(error).__name__}: {str(error)[:200]}; run again with --debug and report what it shows."

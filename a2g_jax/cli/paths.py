@@ -1,4 +1,4 @@
-"""Checks that inputs exist, before anything heavy is imported; the library checks their contents later.
+"""Checks that inputs exist and outputs can be written, before anything heavy is imported; the library checks the rest.
 
 The messages are those of :func:`~a2g_jax.io.files.check_readable`, :func:`~a2g_jax.training.run.load_run` and
 :meth:`~a2g_jax.data.corpus.Corpus.open`.
@@ -8,6 +8,7 @@ from collections.abc import Container
 from pathlib import Path
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.files import check_folder_writable
 from a2g_jax.training.run_file import SHIPPED, SHIPPED_FEATURES
 
 
@@ -68,6 +69,31 @@ def existing_report(folder: str) -> None:
     """
     if not (Path(folder) / "report.json").is_file():
         raise InputError(f"{Path(folder)}: is no report (no report.json in it); make one with 'a2g evaluate RUN ...'.")
+
+
+def writable_folder(path: str | None) -> None:
+    """Refuse a folder for output that cannot be written to or created; None passes.
+
+    Raises:
+        InputError: it or one of its parents is a file.
+        OutputError: nothing can be written there.
+    """
+    if path is not None:
+        check_folder_writable(path)
+
+
+def writable_file(path: str | None) -> None:
+    """Refuse a file for output whose folder cannot be written to; None passes.
+
+    Raises:
+        InputError: it is a folder, or its folder is a file.
+        OutputError: nothing can be written there.
+    """
+    if path is None:
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{Path(path)}: is a folder; name a file in it.")
+    check_folder_writable(Path(path).parent)
 
 
 def _missing(path: Path) -> bool:

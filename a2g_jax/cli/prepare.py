@@ -3,6 +3,7 @@
 import argparse
 import dataclasses
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from a2g_jax.cli.argument_types import (
@@ -18,7 +19,7 @@ from a2g_jax.cli.argument_types import (
     seed,
     share,
 )
-from a2g_jax.cli.paths import existing_file, existing_folder, existing_run
+from a2g_jax.cli.paths import existing_file, existing_folder, existing_run, writable_folder
 from a2g_jax.data.data_set_names import NAMES, all_names, is_reference
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.cutoff import CUTOFF
@@ -160,6 +161,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         raise InputError("name what to prepare: 'a2g prepare talker', or a data set ('a2g prepare --list').")
     if options.out is None:
         raise InputError("--out is needed: the folder to make.")
+    writable_folder(str(Path(options.out).parent))
     corpus = _generated(options) if options.reader == "talker" else _recorded(options)
     seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
     print(

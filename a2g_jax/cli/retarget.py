@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from a2g_jax.cli.argument_types import SMOOTH_HELP, cutoff, frame_rate
-from a2g_jax.cli.paths import existing_file
+from a2g_jax.cli.paths import existing_file, writable_file
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.cutoff import CUTOFF
 
@@ -45,6 +45,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     existing_file(options.source)
     if options.to not in _OWN:
         existing_file(options.to)
+    writable_file(options.out)
 
     from a2g_jax.geometry.mirror import mirror
     from a2g_jax.geometry.motion import resample

@@ -3,7 +3,7 @@
 import argparse
 
 from a2g_jax.cli.argument_types import count, formats, frame_rate, number, sample_rate, seed
-from a2g_jax.cli.paths import existing_corpus
+from a2g_jax.cli.paths import existing_corpus, writable_folder
 from a2g_jax.cli.sampling import print_written
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import talk_formats
@@ -60,6 +60,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         name = next(iter(chosen))
         raise InputError(f"--{name} cannot be chosen for a recording of a corpus; leave it or --corpus out.")
     existing_corpus(options.corpus)
+    writable_folder(options.out)
 
     from a2g_jax.generation.talk.files import deliver_talk
     from a2g_jax.generation.talk.request import TalkRequest, corpus_request

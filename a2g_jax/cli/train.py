@@ -5,7 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.cli.paths import existing_corpus, existing_features, existing_run
+from a2g_jax.cli.argument_types import VERIFY
+from a2g_jax.cli.paths import existing_corpus, existing_features, existing_run, writable_folder
 from a2g_jax.config import from_json, parse_flags, settings_lines
 from a2g_jax.errors import InputError
 from a2g_jax.models.entry import Entry
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="resume from the latest checkpoint with the settings of the run, or start where there is none",
     )
+    parser.add_argument("--verify", action="store_true", help=VERIFY)
     parser.add_argument("--settings", action="store_true", help="list every setting with its value, and exit")
 
 
@@ -70,6 +72,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
                 raise InputError(f"--{name} is needed (see 'a2g train --help').")
         existing_corpus(options.corpus)
         existing_features(options.features)
+        writable_folder(options.out)
     published = [entry.presets[preset], entry.training_preset(preset)]
     if options.source is not None:
         preset, *published = _source(options.source, options.model, entry)
@@ -98,6 +101,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
         options.resume,
         options.features,
         options.source,
+        options.verify,
     )
     # A run folder names its model, and code of other packages is imported only by permission.
     allowed = f"A2G_MODELS={options.model} " if ":" in options.model else ""

@@ -7,6 +7,8 @@ import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, Shaped
 
+from a2g_jax.io.stored_array import StoredArray
+
 
 class Batch(NamedTuple):
     """B clips of T frames; the fields that a model does not declare are None, audio and poses are always there."""
@@ -126,7 +128,7 @@ def gather(
 
 
 def gather_from_disk(
-    array: Shaped[np.ndarray, "N *rest"], starts: Int[np.ndarray, " B"], frames: int
+    array: Shaped[np.ndarray | StoredArray, "N *rest"], starts: Int[np.ndarray, " B"], frames: int
 ) -> Shaped[np.ndarray, "B T *rest"]:
     """Clips of an array that is too large for the device; the last ones of an array begin early enough to fit."""
     last = len(array) - frames

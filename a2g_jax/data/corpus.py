@@ -1,11 +1,13 @@
-"""A prepared corpus on disk: features and motion at the same frame times, as memory-mapped arrays."""
+"""A prepared corpus on disk: features and motion at the same frame times."""
 
+import hashlib
+import io
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32, Int64
@@ -21,12 +23,19 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
 from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import read_json
+from a2g_jax.io.files import check_readable, parse_json
+from a2g_jax.io.sealed import read_sealed
+from a2g_jax.io.stored_array import StoredArray
+from a2g_jax.io.untrusted import Limits
+from a2g_jax.io.untrusted.numpy_files import read_npz_file
+
+#: Entries of manifests that have a checksum.
+SEALED_WITH = ("annotations",)
 
 
 @dataclass(frozen=True, eq=False)
 class Corpus:
-    """An open corpus; its arrays are memory-mapped."""
+    """An open corpus; its arrays are read from disk piece by piece."""
 
     path: Path
     fps: float
@@ -41,6 +50,10 @@ class Corpus:
     """SHA-256 over the hashes of its arrays: equal data, equal fingerprint."""
     on_demand: bool = False
     """Whether most training recordings are generated during training instead of stored."""
+    hashes: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of its arrays, statistics and recipes by file name."""
+    annotation_hashes: tuple[str, ...] = ()
+    """SHA-256 of the annotations of each recording; empty in corpora of version 0.1.0."""
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> "Corpus":
@@ -52,7 +65,7 @@ class Corpus:
         path = Path(path)
         if not (path / MANIFEST).is_file():
             raise InputError(f"{path}: is not a corpus (no {MANIFEST} in it); make one with 'a2g prepare'.")
-        manifest = read_json(path / MANIFEST)
+        manifest = read_sealed(path / MANIFEST, SEALED_WITH)
         if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
             raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
         if manifest.get("version") not in (VERSION, VERSION_ON_DEMAND):
@@ -76,7 +89,13 @@ class Corpus:
                 recipe=manifest["recipe"],
                 fingerprint=manifest["fingerprint"],
                 on_demand=manifest["version"] == VERSION_ON_DEMAND,
+                hashes=manifest.get("arrays", {}),
+                annotation_hashes=tuple(manifest.get("annotations", ())),
             )
+            if corpus.hashes and fingerprint_of(corpus.hashes) != corpus.fingerprint:
+                raise ValueError("fingerprint and hashes disagree")
+            if len(corpus.annotation_hashes) not in (0, len(corpus.recordings)):
+                raise ValueError(f"{len(corpus.annotation_hashes)} hashes of annotations")
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
         corpus._check()
@@ -103,7 +122,7 @@ class Corpus:
         if samples := sum(entry.samples for entry in self.recordings):
             expected[WAVEFORM] = (np.int16, (samples,))
         for name, (kind, shape) in expected.items():
-            array = self._array(name)
+            array = getattr(self, name.removesuffix(".npy"))
             if array.shape != shape or array.dtype != kind:
                 raise InputError(
                     f"{self.path / name}: expected {np.dtype(kind)} {shape}; got {array.dtype} {array.shape}; prepare"
@@ -115,16 +134,21 @@ class Corpus:
         if not (parts and all(isinstance(roles, list) and roles for roles in parts) and self.later.get("stored")):
             raise InputError(f"{self.path / PARTS}: is damaged; prepare the corpus anew.")
 
-    def _array(self, name: str) -> np.ndarray:
+    def _bytes(self, name: str, expected: str | None) -> bytes:
+        """The content of a small file, compared with its hash if there is one."""
+        path = check_readable(self.path / name, "a file of a corpus")
         try:
-            return np.load(self.path / name, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise InputError(f"{self.path / name}: cannot be read ({error}); prepare the corpus anew.") from None
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror}); check the disk.") from None
+        if expected is not None and hashlib.sha256(data).hexdigest() != expected:
+            raise InputError(differs(path))
+        return data
 
     @cached_property
     def later(self) -> dict[str, Any]:
         """Recipes of recordings that are generated in training (:mod:`a2g_jax.data.on_demand`); else empty."""
-        return read_json(self.path / PARTS) if self.on_demand else {}
+        return parse_json(self._bytes(PARTS, self.hashes.get(PARTS)), self.path / PARTS) if self.on_demand else {}
 
     @property
     def body(self) -> Skeleton | PoseLayout:
@@ -205,22 +229,22 @@ class Corpus:
         return sum(entry.frames for entry in self.recordings)
 
     @cached_property
-    def audio(self) -> Float[np.ndarray, "N width"]:
+    def audio(self) -> Float[StoredArray, "N width"]:
         """Log-mel energies in dB."""
-        return self._array("audio.npy")
+        return StoredArray(self.path / "audio.npy")
 
     @cached_property
-    def pose(self) -> Float[np.ndarray, "N R D"]:
+    def pose(self) -> Float[StoredArray, "N R D"]:
         """Poses in the corpus's :attr:`space`; in 6D the first two columns of each local rotation."""
-        return self._array("pose.npy")
+        return StoredArray(self.path / "pose.npy")
 
     @cached_property
-    def root(self) -> Float[np.ndarray, "N 3"]:
+    def root(self) -> Float[StoredArray, "N 3"]:
         """Root positions, metres."""
-        return self._array("root.npy")
+        return StoredArray(self.path / "root.npy")
 
     @cached_property
-    def waveform(self) -> Int16[np.ndarray, " samples"]:
+    def waveform(self) -> Int16[StoredArray, " samples"]:
         """The audio itself, at ``mel.sample_rate``.
 
         Raises:
@@ -228,9 +252,9 @@ class Corpus:
         """
         if not any(entry.samples for entry in self.recordings):
             raise InputError(f"{self.path}: stores no waveforms; prepare it with --waveform.")
-        return self._array(WAVEFORM)
+        return StoredArray(self.path / WAVEFORM)
 
-    def array(self, name: str) -> np.ndarray:
+    def array(self, name: str) -> "np.ndarray | StoredArray":
         """An array that batches are gathered from: a row a frame, and ``waveform`` with a row a sample.
 
         Args:
@@ -247,7 +271,7 @@ class Corpus:
             return self._words[("words", "word_starts").index(name)]
         if name == "waveform_start":
             return self._first_samples
-        stored: np.ndarray = getattr(self, name)  # audio, pose or waveform
+        stored: StoredArray = getattr(self, name)  # audio, pose or waveform
         return stored
 
     @cached_property
@@ -280,15 +304,17 @@ class Corpus:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """``audio`` (width,), ``pose`` (R, D) and ``root`` (3,), over the training split only."""
-        path = self.path / "statistics.npz"
+        path, names = self.path / "statistics.npz", ("audio", "pose", "root")
         try:
-            with np.load(path, allow_pickle=False) as arrays:
-                return {
-                    name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"])
-                    for name in ("audio", "pose", "root")
-                }
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-            raise InputError(f"{path}: cannot be read ({error}); prepare the corpus anew.") from None
+            data = self._bytes(path.name, self.hashes.get(path.name))
+            keys = [f"{name}_{part}" for name in names for part in ("mean", "std")]
+            arrays = read_npz_file(io.BytesIO(data), str(path), keys, limits=Limits(size=2**26))
+        except InputError as error:
+            if str(error) == differs(path):
+                raise
+            reason = str(error).removeprefix(f"{path}").lstrip(":, ").rstrip(".")
+            raise InputError(f"{path}: cannot be read ({reason}); prepare the corpus anew.") from None
+        return {name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"]) for name in names}
 
     def segments(self, split: str) -> list[Segment]:
         """The stretches of a split, as rows of the arrays.
@@ -315,4 +341,20 @@ class Corpus:
 
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and other annotations of a recording; times in seconds."""
-        return read_json(self.path / "annotations" / f"{recording:05d}.json")
+        name = f"annotations/{recording:05d}.json"
+        expected = self.annotation_hashes[recording] if self.annotation_hashes else None
+        found: dict[str, Any] = parse_json(self._bytes(name, expected), self.path / name)
+        return found
+
+
+def differs(path: Path) -> str:
+    """The message for a file whose content is not that of its hash."""
+    return (
+        f"{path}: differs from its hash in {MANIFEST}: it was damaged or changed; copy the corpus again, or prepare it"
+        " anew."
+    )
+
+
+def fingerprint_of(hashes: Mapping[str, str]) -> str:
+    """The fingerprint of a corpus from the hashes of its files."""
+    return hashlib.sha256("".join(hashes.values()).encode()).hexdigest()

@@ -1,31 +1,32 @@
 """Writing a corpus: rows, statistics, splits, manifest. Interruptible and resumable."""
 
-import hashlib
 import json
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from a2g_jax import __version__
 from a2g_jax.data.body_json import body_to_json
-from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus import Corpus, fingerprint_of
 from a2g_jax.data.corpus_layout import ARRAYS, FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
 from a2g_jax.data.featurise import Prepared as Prepared
 from a2g_jax.data.featurise import Skipped as Skipped
 from a2g_jax.data.featurise import prepare_recording as prepare_recording
 from a2g_jax.data.journal import Unfinished
+from a2g_jax.data.prepared_checks import check_finite, is_still
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Splits, official_splits
-from a2g_jax.errors import InputError, Interrupted
+from a2g_jax.errors import InputError, Interrupted, OutputError
 from a2g_jax.features.statistics import RunningStatistics
-from a2g_jax.io.files import make_folder, read_json, sha256_file, write_json
+from a2g_jax.io.files import disk_full, make_folder, read_json, sha256_file, unwritable, write_json
+from a2g_jax.io.locks import locked
+from a2g_jax.io.sealed import write_sealed
 
 #: Lower bounds on standard deviations, which are used as divisors.
 _FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
@@ -118,8 +119,13 @@ def _add(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callabl
     """Add a recording, or note why it cannot be added."""
     if isinstance(item, Prepared):
         try:
+            check_finite(item)
             work.append(item)
+            if is_still(item):
+                report(f"{' and '.join(item.sources) or item.name}: nothing moves in {item.name!r}; check the export.")
             return
+        except OutputError:
+            raise
         except InputError as error:
             if not skip:
                 raise
@@ -154,6 +160,7 @@ def write_corpus(
         try:
             work.recover([])
             for item in prepared:
+                check_finite(item)
                 work.append(item)
             _finish(work, path, Plan(features, recipe, seed), report)
         finally:
@@ -175,22 +182,17 @@ def _place(path: Path) -> Iterator[Path]:
     if not folder.exists():
         _refuse_existing(path)
     make_folder(path.parent)
-    lock = FileLock(path.parent / f".{path.name}.lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        raise InputError(f"{path}: another process is preparing it; wait for it or choose another folder.") from None
-    try:
+    with locked(path.parent / f".{path.name}.lock", f"{path}: is being prepared"):
         if os.path.lexists(path):
             # The process that finished the corpus was killed before it had removed its working files.
             shutil.rmtree(folder, ignore_errors=True)
         _refuse_existing(path)
-        yield folder
-    finally:
-        # Removed while locked, so that no process removes the lock of the next one; Windows removes it on release.
-        with suppress(OSError):
-            Path(lock.lock_file).unlink()
-        lock.release()
+        try:
+            yield folder
+        except (OSError, OutputError) as error:
+            if not disk_full(error):
+                raise
+            raise unwritable(path, error, "free some space, then run the same command to resume") from error
 
 
 def _discard_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
@@ -244,7 +246,7 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
         "format": FORMAT,
         "version": VERSION_ON_DEMAND if plan.parts else VERSION,
         "package": __version__,
-        "fingerprint": hashlib.sha256("".join(hashes.values()).encode()).hexdigest(),
+        "fingerprint": fingerprint_of(hashes),
         "recipe": plan.recipe,
         **features.to_json(),
         "seconds": work.frames / features.fps,
@@ -252,9 +254,10 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
         "recordings": [asdict(entry) for entry in entries],
         "splits": {name: [list(segment) for segment in segments] for name, segments in splits.items()},
         "arrays": hashes,
+        "annotations": work.annotation_hashes,
         "skipped": [asdict(item) for item in work.skipped],
     }
-    write_json(folder / MANIFEST, manifest)
+    write_sealed(folder / MANIFEST, manifest)
     folder.replace(path)
     shutil.rmtree(work.folder, ignore_errors=True)
 

@@ -41,6 +41,8 @@ class Unfinished:
         self.skipped: list[Skipped] = []
         """Recordings that could not be prepared."""
         self.body: Skeleton | PoseLayout | None = None
+        self.annotation_hashes: list[str] = []
+        """SHA-256 of the annotations of each entry."""
         self.spread = 0.0
         """Largest difference of a bone offset from that of the first recording, metres."""
         self._features = features
@@ -87,7 +89,7 @@ class Unfinished:
         arrays = [np.ascontiguousarray(each, _kind(name)) for name, each in zip(self._arrays, values, strict=True)]
         for name, array in zip(self._arrays, arrays, strict=True):
             file = self._file(name)
-            array.tofile(file)
+            file.write(array.reshape(-1).view(np.uint8).data)
             _sync(file)
         annotations = self._annotations(len(self.entries))
         write_json(annotations, item.annotations)
@@ -102,15 +104,17 @@ class Unfinished:
             self._samples,
             0 if item.waveform is None else len(item.waveform),
         )
+        digest = sha256_file(annotations)
         value = {
             "entry": asdict(entry),
             "rows": hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest(),
-            "annotations": sha256_file(annotations),
+            "annotations": digest,
             "spread": self.spread,
             "body": None if self.entries else body_to_json(item.body),
         }
         self._write_line(value)
         self.entries.append(entry)
+        self.annotation_hashes.append(digest)
 
     def skip(self, item: Skipped) -> None:
         """Note a recording that cannot be prepared; it is tried again once one of its files has changed."""
@@ -144,9 +148,10 @@ class Unfinished:
 
     def close(self) -> None:
         """Close the arrays."""
-        for file in self._files.values():
-            file.close()
-        self._files = {}
+        files, self._files = self._files, {}
+        for file in files.values():
+            with suppress(OSError):  # what a full disk did not take; the journal has no line of it
+                file.close()
 
     def _check_body(self, item: Prepared) -> None:
         where, body = " and ".join(item.sources) or item.name, item.body
@@ -198,6 +203,7 @@ class Unfinished:
                 self.body = None
             return False
         self.entries.append(entry)
+        self.annotation_hashes.append(line["annotations"])
         self.spread = line["spread"]
         return True
 

@@ -42,8 +42,8 @@ class OnDemand:
 class Part(NamedTuple):
     """Recordings of one turn of training."""
 
-    arrays: dict[str, np.ndarray]
-    """By the names of :meth:`Corpus.array`."""
+    arrays: dict[str, Any]
+    """NumPy arrays or arrays on disk, by the names of :meth:`Corpus.array`."""
     segments: list[Segment]
     """Stretches within which clips may lie, as rows of the arrays."""
 

@@ -1,12 +1,13 @@
 """Confusion matrices of classifiers as JSON, Markdown and a picture."""
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from a2g_jax.io.files import atomic_path, make_folder
+from a2g_jax.io.staging import staged
 
 
 def write_confusion(result: dict[str, Any], out: Path) -> list[Path]:
@@ -15,28 +16,25 @@ def write_confusion(result: dict[str, Any], out: Path) -> list[Path]:
     Args:
         result: of :func:`a2g_jax.evaluation.confusion.classify_split`.
     """
-    make_folder(out)
-    written = []
-    for name, text in (("confusion.json", json.dumps(result, indent=1) + "\n"), ("confusion.md", markdown(result))):
-        with atomic_path(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        written.append(out / name)
-    try:
-        import matplotlib  # noqa: F401 - optional
-    except ImportError:
-        return written
-    from a2g_jax.viz.confusion import Panel, save_confusion
+    texts = {"confusion.json": json.dumps(result, indent=1) + "\n", "confusion.md": markdown(result)}
+    written = list(texts)
+    with staged(out) as folder:
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        if find_spec("matplotlib") is not None:
+            from a2g_jax.viz.confusion import Panel, save_confusion
 
-    panels = [
-        Panel(
-            f"{name}, {one['input']}: {100 * one['accuracy']['mean']:.1f} %",
-            one["emotions"],
-            np.array(one["confusion"]),
-        )
-        for name, one in result["classifiers"].items()
-    ]
-    save_confusion(out / "confusion.png", panels)
-    return [*written, out / "confusion.png"]
+            panels = [
+                Panel(
+                    f"{name}, {one['input']}: {100 * one['accuracy']['mean']:.1f} %",
+                    one["emotions"],
+                    np.array(one["confusion"]),
+                )
+                for name, one in result["classifiers"].items()
+            ]
+            save_confusion(folder / "confusion.png", panels)
+            written.append("confusion.png")
+    return [out / name for name in written]
 
 
 def markdown(result: dict[str, Any]) -> str:

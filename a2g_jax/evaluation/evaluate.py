@@ -10,6 +10,7 @@ import numpy as np
 
 from a2g_jax import __version__
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_integrity import verify_corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.arrays import Pose
@@ -112,9 +113,10 @@ def evaluate(
         report: called with the number of (candidate, clip) pairs done, and their total.
 
     Raises:
-        InputError: runs that do not fit the corpus or that were trained with a loss on the feature network, or a split
-            without a stretch long enough.
+        InputError: a file of the corpus was damaged or changed, runs that do not fit the corpus or that were trained
+            with a loss on the feature network, or a split without a stretch long enough.
     """
+    verify_corpus(corpus)
     check_runs(runs, corpus)
     check_separate(runs, network)
     segments = [_cut(segment) for segment in corpus.segments(split) if segment.frames >= _LEAST_FRAMES]

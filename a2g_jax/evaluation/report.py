@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ from a2g_jax.errors import InputError
 from a2g_jax.evaluation.emotion_tables import emotion_lines, emotions_picture
 from a2g_jax.evaluation.report_notes import condition, notes, preface
 from a2g_jax.evaluation.scores import METRICS, Metric
-from a2g_jax.io.files import atomic_path, make_folder, read_json
+from a2g_jax.io.files import atomic_path, read_json
+from a2g_jax.io.staging import staged
 from a2g_jax.metrics.units import find_units
 
 _ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
@@ -33,28 +35,26 @@ _LATEX_ARROWS = {"lower": r"$\downarrow$", "higher": r"$\uparrow$", "truth": r"$
 def write_report(result: dict[str, Any], out: Path) -> list[Path]:
     """Write ``report.json``, ``report.md``, ``report.tex`` and, where Matplotlib is installed, ``report.png``.
 
-    With a classifier of emotions also ``emotions.png``.
+    With a classifier of emotions also ``emotions.png``. All of them take the place of an earlier report together.
+
+    Raises:
+        OutputError: the disk is full, or the folder cannot be written to; an earlier report stays.
     """
-    make_folder(out)
     texts = {
         "report.json": json.dumps(result, indent=1) + "\n",
         "report.md": markdown(result),
         "report.tex": latex(result),
     }
-    written = []
-    for name, text in texts.items():
-        with atomic_path(out / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        written.append(out / name)
-    try:
-        import matplotlib  # noqa: F401 - optional
-    except ImportError:
-        return written
-    _picture(result, out / "report.png")
-    written.append(out / "report.png")
-    if emotions_picture(result, out / "emotions.png", BASELINES):
-        written.append(out / "emotions.png")
-    return written
+    written = list(texts)
+    with staged(out) as folder:
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        if find_spec("matplotlib") is not None:
+            _picture(result, folder / "report.png")
+            written.append("report.png")
+            if emotions_picture(result, folder / "emotions.png", BASELINES):
+                written.append("emotions.png")
+    return [out / name for name in written]
 
 
 def markdown(result: dict[str, Any]) -> str:

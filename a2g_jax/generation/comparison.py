@@ -20,7 +20,7 @@ from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_si
 from a2g_jax.generation.generator import Generator, audio_frames
 from a2g_jax.generation.talk.page import gesture_lane
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.io.files import make_folder, write_json
+from a2g_jax.io.files import check_folder_writable, write_json
 from a2g_jax.io.words import Word
 from a2g_jax.talker.demo_speech import demo_recording
 from a2g_jax.talker.speech import plan_from_json
@@ -153,35 +153,36 @@ def compare(
         sizes = [(audio_frames(run, audio[run.config.mel.sample_rate]), run.config.skeleton) for run in runs.values()]
         frames, body = max(sizes, key=lambda size: size[0] * size[1].joints)
         check_page_size(samples * len(runs) + 1, frames, body.joints)
-    folder = make_folder(out)  # a folder that cannot be used is refused before any work
+    check_folder_writable(out)  # before any work
     checked = {name: Checked(run, Generator(run), strict=strict) for name, run in runs.items()}
     motions = {
         name: _motions(name, each, audio[runs[name].config.mel.sample_rate], samples, seed, report)
         for name, each in checked.items()
     }
     # This removes the talker's motion of an earlier speech, also where this one has none.
-    stems = dict.fromkeys((*_stems_before(folder), "sample", TALKER, *runs))
-    files = {stem: MotionFiles(folder, stem, formats, REPORTS) for stem in stems}
+    stems = tuple(dict.fromkeys((*_stems_before(Path(out)), "sample", TALKER, *runs)))
     figures = [] if speech.truth is None else [speech.truth]
-    for name, made in motions.items():
-        for number, motion in enumerate(made):
-            files[name].write(number, motion)
-            label = f"{name} {number}" if samples > 1 else name
-            findings = checked[name].reports[number].findings
-            figures.append(checked_figure(motion, label, findings, _note(runs[name], without.get(name, ()))))
-    if speech.truth is not None:
-        files[TALKER].write(0, speech.truth.motion)
-    write_json(folder / CHECKS, {"format": _FORMAT, "systems": {name: one.to_json() for name, one in checked.items()}})
-    if PAGE in formats:
-        write_page(
-            folder / "index.html",
-            figures,
-            audio[first.mel.sample_rate],
-            first.mel.sample_rate,
-            title=f"{_count(len(runs), kind)} for {speech.title}",
-            subtitle=_subtitle(speech, samples, seed) + (f"; {', '.join(controls)}" if controls else ""),
-            words=speech.words,
-        )
+    with MotionFiles(out, stems, formats, REPORTS) as files:
+        for name, made in motions.items():
+            for number, motion in enumerate(made):
+                files.write(number, motion, name)
+                label = f"{name} {number}" if samples > 1 else name
+                findings = checked[name].reports[number].findings
+                figures.append(checked_figure(motion, label, findings, _note(runs[name], without.get(name, ()))))
+        if speech.truth is not None:
+            files.write(0, speech.truth.motion, TALKER)
+        systems = {name: one.to_json() for name, one in checked.items()}
+        write_json(files.folder / CHECKS, {"format": _FORMAT, "systems": systems})
+        if PAGE in formats:
+            write_page(
+                files.folder / "index.html",
+                figures,
+                audio[first.mel.sample_rate],
+                first.mel.sample_rate,
+                title=f"{_count(len(runs), kind)} for {speech.title}",
+                subtitle=_subtitle(speech, samples, seed) + (f"; {', '.join(controls)}" if controls else ""),
+                words=speech.words,
+            )
     lines = [f"{name}: {line}" for name, each in checked.items() for line in each.lines()]
     lines += [f"{name}: has no control for {', '.join(rest)}" for name, rest in without.items()]
     return Compared({kind: 1 if kind == PAGE else len(figures) for kind in formats}, tuple(lines))

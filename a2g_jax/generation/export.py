@@ -8,7 +8,7 @@ from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.io.files import make_folder, write_json
+from a2g_jax.io.files import check_folder_writable, write_json
 from a2g_jax.io.words import Word
 from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.training.run import Run
@@ -54,37 +54,40 @@ def export(
     Raises:
         InputError: a folder that cannot be used, audio shorter than a frame, too large a page, or a motion that is
             refused. Without ``strict``, those before it stay in the folder, and ``checks.json`` has the findings.
+        OutputError: the disk is full, or the folder cannot be written to; files of an earlier call stay.
     """
     audio = speech_at_rate(run, audio, sample_rate)
     if PAGE in formats:
         check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
+    check_folder_writable(out)  # before any work
     if checked.strict:
-        make_folder(out)  # a folder that cannot be used is refused before any work
         motions = list(_counted(motions, report))
-    files, figures, done = MotionFiles(out, "sample", formats, REPORTS), [], 0
-    try:
-        for done, motion in enumerate(motions, start=1):
-            files.write(done - 1, motion)
-            if PAGE in formats:
-                figures.append(checked_figure(motion, f"sample {done - 1}", checked.reports[done - 1].findings))
-            if not checked.strict:
-                report(done)
-    finally:
-        if done:  # motions before one that is refused stay, with the findings on all
-            write_json(files.folder / "checks.json", checked.to_json())
-    if figures:
-        write_page(
-            files.folder / "index.html",
-            figures,
-            audio,
-            run.config.mel.sample_rate,
-            title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-            subtitle=_caption(checked, seed, label),
-            words=words,
-            lanes=lanes,
-        )
+    figures: list[Figure] = []
+    with MotionFiles(out, ("sample",), formats, REPORTS) as files:
+        done = 0
+        try:
+            for done, motion in enumerate(motions, start=1):
+                files.write(done - 1, motion)
+                if PAGE in formats:
+                    figures.append(checked_figure(motion, f"sample {done - 1}", checked.reports[done - 1].findings))
+                if not checked.strict:
+                    report(done)
+        finally:
+            if done:  # motions before one that is refused stay, with the findings on all
+                write_json(files.folder / "checks.json", checked.to_json())
+        if figures:
+            write_page(
+                files.folder / "index.html",
+                figures,
+                audio,
+                run.config.mel.sample_rate,
+                title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
+                subtitle=_caption(checked, seed, label),
+                words=words,
+                lanes=lanes,
+            )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 

@@ -8,10 +8,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.files import make_folder
+from a2g_jax.io.staging import staged
 from a2g_jax.plugins import FORMATS as GROUP
 from a2g_jax.plugins import entry_points_of, load_entry_point, load_object
 
@@ -106,38 +106,45 @@ def check_page_size(motions: int, frames: int, joints: int) -> None:
 
 
 class MotionFiles:
-    """The files of several motions in a folder: ``sample_00.bvh``, ``sample_00.npz``, ...
+    """The files of several motions in a folder: ``sample_00.bvh``, ``sample_00.npz``, ...; a context manager.
 
-    Files of an earlier call of the same names, which belong to another speech, are removed first.
+    When the block ends, they take the place of those of an earlier call. After an error that refuses a motion, or
+    Ctrl-C, those before it do; on a full disk the earlier ones stay (:func:`~a2g_jax.io.staging.staged`).
     """
 
     def __init__(
         self,
         out: str | os.PathLike[str],
-        stem: str,
+        stems: Sequence[str],
         formats: Sequence[str],
         others: str = "",
     ) -> None:
         """
         Args:
-            stem: beginning of the files' names.
+            stems: beginnings of the files' names.
             formats: names of formats; those without a file for each motion are ignored.
             others: a regular expression for further files that are replaced.
 
         Raises:
-            InputError: a folder or a format that cannot be used.
+            InputError: a format that cannot be used.
         """
         found = {name: motion_format(name) for name in formats}
         self._formats = {name: each for name, each in found.items() if each is not None}
-        self.folder = make_folder(out)
-        self._stem = stem
         suffixes = "|".join(re.escape(each.suffix) for each in (MOTION_FORMATS | self._formats).values())
-        own = re.compile(rf"{re.escape(stem)}_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
-        for old in self.folder.iterdir():
-            if own.fullmatch(old.name) and not old.is_dir():
-                old.unlink()
+        begin = "|".join(map(re.escape, stems))
+        own = re.compile(rf"(?:{begin})_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
+        self._stem = stems[0]
+        self._staged = staged(out, lambda name: own.fullmatch(name) is not None, (InputError, KeyboardInterrupt))
 
-    def write(self, number: int, motion: "Motion") -> None:
+    def __enter__(self) -> "MotionFiles":
+        self.folder = self._staged.__enter__()
+        """Where further files are written that belong to the motions."""
+        return self
+
+    def __exit__(self, *error: Any) -> bool | None:
+        return self._staged.__exit__(*error)
+
+    def write(self, number: int, motion: "Motion", stem: str = "") -> None:
         """Write the files of a motion."""
         for each in self._formats.values():
-            each.write(self.folder / f"{self._stem}_{number:02d}{each.suffix}", motion)
+            each.write(self.folder / f"{stem or self._stem}_{number:02d}{each.suffix}", motion)

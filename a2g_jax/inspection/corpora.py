@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_integrity import damaged_files
 from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
@@ -26,14 +27,17 @@ from a2g_jax.progress import progress_bar
 _WIDE = 20.0
 
 
-def inspect_corpus(path: Path) -> Report:
+def inspect_corpus(path: Path, verify: bool = False) -> Report:
     """Recordings, splits and statistics of a corpus, with faults of its arrays and leaks between its splits.
 
+    Args:
+        verify: read all files to compare their hashes, also those that seem unchanged since last time.
+
     Raises:
-        InputError: not a corpus, or a damaged one.
+        InputError: not a corpus, or one whose manifest or statistics are damaged.
     """
     corpus = Corpus.open(path)
-    findings = check_overlaps(corpus) + check_sources(corpus) + check_statistics(corpus)
+    findings = check_hashes(corpus, verify) + check_overlaps(corpus) + check_sources(corpus) + check_statistics(corpus)
     audio_prints: list[Fingerprint] = []
     motion_prints: list[Fingerprint] = []
     offsets: list[Offset] = []
@@ -67,6 +71,15 @@ def inspect_corpus(path: Path) -> Report:
             "motion is late by (s)": median,
         }
     return Report(str(path), "corpus", facts, findings)
+
+
+def check_hashes(corpus: Corpus, verify: bool) -> list[Finding]:
+    """Findings on files that differ from their hashes."""
+    findings = []
+    for message in damaged_files(corpus, verify):
+        name, _, reason = message.removeprefix(f"{corpus.path}/").partition(": ")
+        findings.append(Finding("warning", "damaged", reason, place=Place(path=name)))
+    return findings
 
 
 def _rows(corpus: Corpus) -> Iterator[tuple[Entry, np.ndarray, np.ndarray, np.ndarray]]:

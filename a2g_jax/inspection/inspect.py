@@ -17,6 +17,7 @@ from a2g_jax.training.run_file import RUN_FILE, SHIPPED
 def inspect(
     name: str | os.PathLike[str],
     audio: str | os.PathLike[str] | None = None,
+    verify: bool = False,
     *,
     channel: int | None = None,
     tier: str | None = None,
@@ -27,6 +28,7 @@ def inspect(
         name: path of the file or folder, or the name of a run that comes with the package: ``"demo"``,
             ``"demo-flow"`` or ``"demo-emotion"``. ``"./demo"`` is a folder of that name.
         audio: the speech that belongs to a motion or a transcript.
+        verify: read all files of a corpus to compare their hashes, also those that seem unchanged since last time.
         channel: of audio files, from 1 on; None for the mean of all.
         tier: of TextGrids, its name or the speaker's; None for the first one of words.
 
@@ -34,10 +36,10 @@ def inspect(
         InputError: no such file or folder, or one of an unknown kind.
     """
     with reading(channel, tier):
-        return _inspect(name, audio)
+        return _inspect(name, audio, verify)
 
 
-def _inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None) -> Report:
+def _inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None, verify: bool) -> Report:
     path = Path(name)
     if name in SHIPPED or path.is_dir():
         if audio is not None:
@@ -46,7 +48,7 @@ def _inspect(name: str | os.PathLike[str], audio: str | os.PathLike[str] | None)
         if name in SHIPPED:
             return inspect_run(name)
         if (path / MANIFEST).exists():
-            return inspect_corpus(path)
+            return inspect_corpus(path, verify)
         if (path / RUN_FILE).exists():
             return inspect_run(path)
         return inspect_folder(path)

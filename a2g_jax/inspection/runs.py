@@ -14,10 +14,11 @@ from a2g_jax.inspection.tree import body_facts
 from a2g_jax.training.early_stopping import ended, read_metrics, validations
 from a2g_jax.training.fine_tuning import training_model
 from a2g_jax.training.run import Run, open_run
-from a2g_jax.training.run_file import SHIPPED
+from a2g_jax.training.run_file import LOG_FILE, SHIPPED
+from a2g_jax.training.run_hashes import check_log
 from a2g_jax.training.stages import span_at, stage_spans
+from a2g_jax.training.vanished import zero_gradient, zero_message
 
-_METRICS = "metrics.jsonl"
 #: Ratio of the last to the best validation loss from which the difference is no fluctuation.
 _WORSE = 1.25
 
@@ -32,8 +33,14 @@ def inspect_run(name: str | os.PathLike[str]) -> Report:
         InputError: not a run, or a damaged one.
     """
     run = open_run(name)
-    log = [] if str(name) in SHIPPED else read_metrics(Path(name) / _METRICS)
-    return Report(str(name), "run", run_facts(run, log), check_run(run, log))
+    log = [] if str(name) in SHIPPED else read_metrics(Path(name) / LOG_FILE)
+    findings = [] if str(name) in SHIPPED else _check_log(Path(name))
+    return Report(str(name), "run", run_facts(run, log), findings + check_run(run, log))
+
+
+def _check_log(folder: Path) -> list[Finding]:
+    wrong = check_log(folder)
+    return [Finding("warning", "damaged", f"{wrong}.")] if wrong else []
 
 
 def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
@@ -51,6 +58,9 @@ def check_run(run: Run, log: list[dict[str, Any]]) -> list[Finding]:
     if None in losses:
         message = f"{losses.count(None)} logged losses are not numbers."
         findings.append(Finding("warning", "nan", message, "Lower the learning rate, or inspect the corpus."))
+    if (zero := zero_gradient(log)) is not None:
+        fix = "Train again with a lower learning rate or another seed."
+        findings.append(Finding("warning", "zero-gradient", f"{zero_message(*zero)}.", fix, value=float(zero[0])))
     # Losses of different stages cannot be compared.
     checked = [
         line["loss"]

@@ -1,16 +1,21 @@
 """Reading and writing files safely: one-line errors and atomic writes."""
 
+import errno
 import hashlib
 import json
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, OutputError
+from a2g_jax.io.temporary import temporary_path
+
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
+#: The same in messages of libraries that raise errors of their own.
+_FULL_TEXTS = ("No space left on device", "Disk quota exceeded", "File too large", "Read-only file system")
 
 
 def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
@@ -49,10 +54,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Write a file completely or not at all.
 
     Yields a temporary path in the same folder with the same suffix. When the block succeeds, that file replaces
-    ``path``; when it raises, it is removed and ``path`` stays unchanged. Missing folders are created.
+    ``path``; when it raises, it is removed and ``path`` stays unchanged. Missing folders are created. Temporary files
+    that killed processes left in the folder are removed.
 
     Raises:
-        InputError: the folder cannot be created or written to, or ``path`` is a folder or a device.
+        OutputError: the folder cannot be created or written to, or the disk is full.
+        InputError: ``path`` is a folder or a device.
     """
     path = Path(path)
     # Links are followed: the file is replaced, not the link.
@@ -62,7 +69,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     # Renaming over a device such as /dev/null would replace the device.
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: is not an ordinary file; write to another path.")
-    temporary = target.with_name(f".{target.stem[:80]}.{secrets.token_hex(6)}{target.suffix}")
+    temporary = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -73,9 +80,59 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     except OSError as error:
         if error.filename not in (None, str(temporary), str(target), str(target.parent)):
             raise
-        raise InputError(
-            f"{path}: cannot be written ({error.strerror or error}); check the folder, its permissions and free space."
-        ) from error
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: str | os.PathLike[str], error: BaseException, remedy: str = "") -> OutputError:
+    """The error for a file or folder that cannot be written.
+
+    Args:
+        error: an ``OSError``, or one that was raised because of it.
+        remedy: in place of the usual one.
+    """
+    remedy = remedy or "check the folder, its permissions and free space"
+    cause: BaseException | None = error
+    while cause is not None and not (isinstance(cause, OSError) and cause.strerror):
+        cause = cause.__cause__ or cause.__context__
+    found = [text for text in _FULL_TEXTS if text in str(error)]
+    reason = cause.strerror if isinstance(cause, OSError) else (found or str(error).splitlines() or [""])[0][:200]
+    return OutputError(f"{path}: cannot be written ({reason}); {remedy}.")
+
+
+def disk_full(error: BaseException | None) -> bool:
+    """Whether an error or one of its causes says that nothing can be written: a full or read-only disk, a quota."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _FULL:
+            return True
+        if any(text in str(error) for text in _FULL_TEXTS):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def check_folder_writable(path: str | os.PathLike[str]) -> None:
+    """Check that a folder can be written to, or created, by creating a file there and removing it.
+
+    Raises:
+        InputError: it or one of its parents is a file.
+        OutputError: nothing can be written there.
+    """
+    path = Path(path)
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r}: is not a usable path; check its characters.")
+    try:
+        whole = place = Path(os.path.abspath(path))  # noqa: PTH100 - links stay
+        while not os.path.lexists(place) and place != place.parent:
+            place = place.parent
+        if not place.is_dir():
+            raise InputError(f"{path}: {'is' if place == whole else f'{place} is'} a file; name a folder.")
+        probe = temporary_path(place / "probe")
+        try:
+            probe.write_bytes(b"a")
+        finally:
+            probe.unlink(missing_ok=True)
+    except OSError as error:
+        raise unwritable(path, error) from None
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
@@ -107,15 +164,20 @@ def sha256_file(path: str | os.PathLike[str]) -> str:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path.") from None
 
 
+def json_text(value: Any) -> str:
+    """``value`` as indented JSON with a line feed at its end: see :func:`write_json`."""
+    return json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=_plain) + "\n"
+
+
 def write_json(path: str | os.PathLike[str], value: Any) -> None:
     """Write ``value`` as indented UTF-8 JSON, atomically.
 
     NumPy scalars, arrays and paths become numbers, lists and text; NaN and infinities, which JSON lacks, raise
     ``ValueError``.
     """
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False, default=_plain)
+    text = json_text(value)
     with atomic_path(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def _plain(value: Any) -> Any:
@@ -133,12 +195,25 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         InputError: no such file, not UTF-8, or not JSON (with the line and column), as with NaN and infinities.
     """
     path = check_readable(path, "a JSON file")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error}).") from None
+    return parse_json(data, path)
+
+
+def parse_json(data: bytes, path: str | os.PathLike[str]) -> Any:
+    """The value of the bytes of a JSON file; errors name ``path``.
+
+    Raises:
+        InputError: as :func:`read_json`.
+    """
 
     def refuse(name: str) -> None:
         raise InputError(f"{path}: contains {name}, which is not JSON; replace it by null or a number.")
 
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=refuse)
+        return json.loads(data.decode("utf-8-sig"), parse_constant=refuse)
     except InputError:
         raise
     except UnicodeDecodeError as error:
@@ -149,5 +224,5 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         ) from None
     except RecursionError:
         raise InputError(f"{path}: is nested too deeply; expected a flatter JSON file.") from None
-    except (ValueError, OSError) as error:  # such as an integer of thousands of digits
+    except ValueError as error:  # such as an integer of thousands of digits
         raise InputError(f"{path}: cannot be read as JSON ({error}).") from None

@@ -17,9 +17,12 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import atomic_path, check_readable
 
-#: Largest array that is read, in bytes, and longest array header.
-_LARGEST = 8 * 2**30
+#: Most bytes that are unpacked, those that any small file may unpack to, and how many for each byte of a larger one:
+#: motion packs to half, zeros to a thousandth.
+_LARGEST, _LEAST, _TIMES = 2 * 2**30, 2**28, 50
 _LONGEST_HEADER = 65_536
+#: Rows checked at once.
+_ROWS = 65_536
 # Exceptions of zipfile, its decompressors and numpy.lib.format for damaged bytes.
 _DAMAGE = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, tokenize.TokenError, struct.error, ArithmeticError, EOFError,
@@ -81,17 +84,26 @@ def read_motion_npz(path: str | os.PathLike[str]) -> Motion:
     except _DAMAGE:
         raise InputError(f"{path}: is not an .npz archive, or is damaged; write it again.") from None
     with archive:
-        rotations = _floats(path, archive, "rotations", (None, None, 3, 3))
-        frames, joints = rotations.shape[:2]
-        root = _floats(path, archive, "root", (frames, 3))
-        offsets = _floats(path, archive, "offsets", (joints, 3))
-        names = _array(path, archive, "joint_names", "U", (joints,))
-        parents = _array(path, archive, "parents", "iu", (joints,))
-        fps = float(_array(path, archive, "fps", "fiu", ()))
+        # All headers are compared before any array is unpacked.
+        claims = _Claims(path, archive)
+        frames, joints = claims.shape("rotations", "f", (None, None, 3, 3))[:2]
+        claims.shape("root", "f", (frames, 3))
+        claims.shape("offsets", "f", (joints, 3))
+        claims.shape("joint_names", "U", (joints,))
+        claims.shape("parents", "iu", (joints,))
+        claims.shape("fps", "fiu", ())
+        tipped = "end_joints.npy" in archive.namelist()
+        if tipped:
+            (count,) = claims.shape("end_joints", "iu", (None,))
+            claims.shape("end_offsets", "f", (count, 3))
+        claims.check_total()
+        rotations, root, offsets = (_floats(path, archive, key) for key in ("rotations", "root", "offsets"))
+        names, parents = _array(path, archive, "joint_names"), _array(path, archive, "parents")
+        fps = float(_array(path, archive, "fps"))
         ends: tuple[tuple[int, tuple[float, float, float]], ...] = ()
-        if "end_joints.npy" in archive.namelist():
-            owners = _array(path, archive, "end_joints", "iu", (None,)).tolist()
-            tips = _floats(path, archive, "end_offsets", (len(owners), 3), np.float64).tolist()
+        if tipped:
+            owners = _array(path, archive, "end_joints").tolist()
+            tips = _floats(path, archive, "end_offsets", np.float64).tolist()
             ends = tuple((owner, (x, y, z)) for owner, (x, y, z) in zip(owners, tips, strict=True))
             if any(not 0 <= owner < joints for owner in owners):
                 raise InputError(f"{path}: end_joints: expected numbers from 0 to {joints - 1}; write it again.")
@@ -111,41 +123,74 @@ def read_motion_npz(path: str | os.PathLike[str]) -> Motion:
     return Motion(rotations=rotations, root=root, skeleton=skeleton, fps=fps)
 
 
-def _floats(
-    path: Path, archive: zipfile.ZipFile, key: str, shape: tuple[int | None, ...], dtype: type = np.float32
-) -> np.ndarray:
-    array = _array(path, archive, key, "f", shape)
+class _Claims:
+    """What the headers of an archive's arrays say; numpy.load would allocate as much."""
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+        self._path, self._archive, self._total = path, archive, 0
+
+    def shape(self, key: str, kinds: str, shape: tuple[int | None, ...]) -> tuple[int, ...]:
+        """The shape in a header.
+
+        Args:
+            kinds: of numbers or text, as NumPy's ``dtype.kind``.
+            shape: what it must be; None for any size.
+
+        Raises:
+            InputError: another shape or kind, or it differs from the size of the data.
+        """
+        path, archive = self._path, self._archive
+        try:
+            member = archive.getinfo(f"{key}.npy")
+        except KeyError:
+            raise InputError(f"{path}: has no array {key!r}; expected an archive as write_motion_npz makes.") from None
+        try:
+            with archive.open(member) as file:
+                found, dtype = _header(file)
+                claimed = math.prod(found) * dtype.itemsize
+                fits = claimed >= 0 and file.tell() + claimed == member.file_size
+        except _DAMAGE as error:
+            raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None
+        matches = len(found) == len(shape) and all(w is None or w == f for w, f in zip(shape, found, strict=True))
+        if dtype.kind not in kinds or not matches:
+            sizes = ", ".join("any" if size is None else str(size) for size in shape)
+            kind = {"f": "floating-point numbers", "U": "text", "iu": "integers", "fiu": "a number"}[kinds]
+            raise InputError(f"{path}: {key}: expected {kind} of shape ({sizes}); got {dtype} of shape {tuple(found)}.")
+        if not fits:
+            raise InputError(f"{path}: {key}: is damaged (its size differs from its header); write it again.")
+        self._total += claimed
+        return found
+
+    def check_total(self) -> None:
+        """Refuse more than :data:`_LARGEST` bytes, and small files that unpack to very many.
+
+        Raises:
+            InputError: they do.
+        """
+        size = self._path.stat().st_size
+        most = min(_LARGEST, max(_LEAST, _TIMES * size))
+        if self._total > most:
+            raise InputError(
+                f"{self._path}: its {size} bytes unpack to {self._total}; expected {most} at most. Cut the motion into"
+                " shorter ones."
+            )
+
+
+def _floats(path: Path, archive: zipfile.ZipFile, key: str, dtype: type = np.float32) -> np.ndarray:
+    array = _array(path, archive, key)
     with np.errstate(over="ignore"):  # values beyond float32 are found below
-        array = array.astype(dtype)
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        place = ", ".join(str(int(index)) for index in bad[0])
-        raise InputError(f"{path}: {key}: expected finite numbers; got NaN or infinity at [{place}].")
+        array = array.astype(dtype, copy=False)
+    for at in range(0, len(array), _ROWS):
+        bad = np.argwhere(~np.isfinite(array[at : at + _ROWS]))
+        if len(bad):
+            place = ", ".join(str(int(index)) for index in (at + bad[0][0], *bad[0][1:]))
+            raise InputError(f"{path}: {key}: expected finite numbers; got NaN or infinity at [{place}].")
     return array
 
 
-def _array(path: Path, archive: zipfile.ZipFile, key: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    # numpy.load allocates the size that an array's header claims, so the claim is checked first.
+def _array(path: Path, archive: zipfile.ZipFile, key: str) -> np.ndarray:
     try:
-        member = archive.getinfo(f"{key}.npy")
-    except KeyError:
-        raise InputError(f"{path}: has no array {key!r}; expected an archive as write_motion_npz makes.") from None
-    try:
-        with archive.open(member) as file:
-            found, dtype = _header(file)
-            claimed = math.prod(found) * dtype.itemsize
-            fits = 0 <= claimed <= _LARGEST and file.tell() + claimed == member.file_size
-    except _DAMAGE as error:
-        raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None
-    matches = len(found) == len(shape) and all(w is None or w == f for w, f in zip(shape, found, strict=True))
-    if dtype.kind not in kinds or not matches:
-        sizes = ", ".join("any" if size is None else str(size) for size in shape)
-        kind = {"f": "floating-point numbers", "U": "text", "iu": "integers", "fiu": "a number"}[kinds]
-        raise InputError(f"{path}: {key}: expected {kind} of shape ({sizes}); got {dtype} of shape {tuple(found)}.")
-    if not fits:
-        raise InputError(f"{path}: {key}: is damaged (its size differs from its header); write it again.")
-    try:
-        with archive.open(member) as file:
+        with archive.open(f"{key}.npy") as file:
             return np.lib.format.read_array(file, allow_pickle=False, max_header_size=_LONGEST_HEADER)
     except _DAMAGE as error:
         raise InputError(f"{path}: {key}: is damaged ({_reason(error)}); write it again.") from None

@@ -1,14 +1,24 @@
 """Checkpoints of a training run, with Orbax: atomic, the latest few."""
 
+import errno
+import logging
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import jax
 from orbax.checkpoint import v1 as ocp
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.files import disk_full, unwritable
+from a2g_jax.training.checkpoint_files import check_files, list_path, write_list
 from a2g_jax.training.state import TrainState
+
+#: Beginnings of the names of folders that are being written and removed.
+_SAVING, _REMOVED = "saving-", "removed-"
 
 
 class Checkpoints:
@@ -34,11 +44,41 @@ class Checkpoints:
         path = self.folder / str(step)
         if path.exists():
             return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        ocp.save(path, state._asdict())
+        saving = self.folder / f"{_SAVING}{step}"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            _check_space(self.folder, state)
+            shutil.rmtree(saving, ignore_errors=True)
+            with _quiet():
+                ocp.save(saving, state._asdict())
+            # A checkpoint gets its name last, when all that belongs to it is on the disk.
+            write_list(saving, path)
+            saving.rename(path)
+        except Exception as error:
+            sweep_unfinished(self.folder)
+            if not disk_full(error):
+                raise
+            last = max(self.steps(), default=None)
+            kept = "there is no earlier one" if last is None else f"that of step {last} is complete"
+            remedy = f"{kept}; free some space, then resume with --resume"
+            raise unwritable(path, error, remedy) from error
         for old in self.steps()[: -self.keep]:
             if old != best:
-                shutil.rmtree(self.folder / str(old))
+                self._remove(old)
+
+    def _remove(self, step: int) -> None:
+        path = self.folder / str(step)
+        hidden = self.folder / f"{_REMOVED}{step}"  # a part of one never has its name
+        path.rename(hidden)
+        list_path(path).unlink(missing_ok=True)
+        shutil.rmtree(hidden, ignore_errors=True)
+
+    def adopt(self) -> None:
+        """Add lists of files to the checkpoints of version 0.1.0, which have none."""
+        for step in self.steps():
+            path = self.folder / str(step)
+            if not list_path(path).exists():
+                write_list(path, path)
 
     def restore(self, like: TrainState, step: int | None = None) -> TrainState | None:
         """The latest state, or None if there is none.
@@ -48,12 +88,13 @@ class Checkpoints:
             step: of another checkpoint.
 
         Raises:
-            InputError: the checkpoint is damaged or of another model.
+            InputError: a file of the checkpoint is changed, missing or added, or it is of another model.
         """
         steps = self.steps()
         if not steps:
             return None
         path = self.folder / str(steps[-1] if step is None else step)
+        check_files(path)
         try:
             tree = _load(path, like)
         except InputError:
@@ -88,8 +129,30 @@ def _names(path: Path) -> set[str]:
 
 
 def sweep_unfinished(folder: Path) -> None:
-    """Remove the unfinished folders of a killed save."""
+    """Remove what a killed or failed save left; nobody else may save there meanwhile."""
     if folder.is_dir():
         for path in folder.iterdir():
             if path.is_dir() and not path.name.isdigit():
                 shutil.rmtree(path, ignore_errors=True)
+            elif path.suffix == ".json" and not path.with_suffix("").is_dir():
+                path.unlink(missing_ok=True)
+
+
+def _check_space(folder: Path, state: TrainState) -> None:
+    """Raise the error of a full disk where the state surely does not fit; libraries write pages about theirs."""
+    size = sum(array.nbytes for array in jax.tree.leaves(state._replace(key=jax.random.key_data(state.key))))
+    # Compression saves little of random numbers.
+    if shutil.disk_usage(folder).free < 0.8 * size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Silence what Orbax logs about errors, which are raised as well."""
+    logger = logging.getLogger("absl")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)

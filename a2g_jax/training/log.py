@@ -1,14 +1,20 @@
 """The output of a training run: a progress bar, metrics.jsonl, and TensorBoard on request."""
 
+import hashlib
 import json
 import math
+import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.files import atomic_path
+from a2g_jax.io.files import atomic_path, unwritable
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.run_file import LOG_FILE
+
+_REMEDY = "free some space, then resume with --resume"
 
 
 class MetricsLog:
@@ -19,8 +25,9 @@ class MetricsLog:
     """
 
     def __init__(self, folder: Path, done: int, settings: TrainConfig, progress: bool, total: int) -> None:
-        self.path = folder / "metrics.jsonl"
+        self.path = folder / LOG_FILE
         self._drop_after(done)
+        self._size, self._digest = 0, hashlib.sha256()
         self.settings = settings
         self.tensorboard: Any = None
         if settings.tensorboard:
@@ -47,8 +54,21 @@ class MetricsLog:
         )
 
     def __enter__(self) -> "MetricsLog":
-        self.file = self.path.open("a", encoding="utf-8")
+        try:
+            self._count(self.path.read_bytes() if self.path.exists() else b"")
+            self.file = self.path.open("ab", buffering=0)
+        except OSError as error:
+            raise unwritable(self.path, error) from None
         return self
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """Length and SHA-256 of the file."""
+        return {"bytes": self._size, "sha256": self._digest.hexdigest()}
+
+    def _count(self, data: bytes) -> None:
+        self._size += len(data)
+        self._digest.update(data)
 
     def __exit__(self, *_: object) -> None:
         self.file.close()
@@ -75,8 +95,16 @@ class MetricsLog:
     def _line(self, step: int, split: str, values: dict[str, float]) -> None:
         # JSON has no NaN.
         plain = {name: value if math.isfinite(value) else None for name, value in values.items()}
-        self.file.write(json.dumps({"step": step, "split": split, **plain}) + "\n")
-        self.file.flush()
+        line = (json.dumps({"step": step, "split": split, **plain}) + "\n").encode()
+        try:
+            rest = line
+            while rest:  # a disk that is almost full takes a part
+                rest = rest[self.file.write(rest) :]
+        except OSError as error:
+            with suppress(OSError):
+                os.ftruncate(self.file.fileno(), self._size)
+            raise unwritable(self.path, error, _REMEDY) from error
+        self._count(line)
         if self.tensorboard is not None:
             for name, value in values.items():
                 self.tensorboard.add_scalar(f"{split}/{name}", value, step)

@@ -1,6 +1,5 @@
 """The training loop: one for every model."""
 
-import json
 import os
 import signal
 import threading
@@ -17,10 +16,13 @@ import numpy as np
 from a2g_jax.data.batch import ClipShape, clip_shape, gather, gather_clips, gather_from_disk
 from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_others, draw_starts, find_crops
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_integrity import verify_corpus
 from a2g_jax.data.on_demand import Part, PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.geometry.mirror_poses import pose_mirror
-from a2g_jax.io.files import make_folder, read_json, write_json
+from a2g_jax.io.files import make_folder
+from a2g_jax.io.locks import locked
+from a2g_jax.io.temporary import sweep
 from a2g_jax.models.base import Model, Params
 from a2g_jax.progress import say
 from a2g_jax.training.averaging import weight_average
@@ -28,16 +30,14 @@ from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.early_stopping import ended, read_metrics, validations
 from a2g_jax.training.fine_tuning import training_model, with_validation
+from a2g_jax.training.folder import LOCK, check_folder
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
-from a2g_jax.training.run_file import FORMAT, RUN_FILE, WEIGHTS_FILE
+from a2g_jax.training.run_hashes import write_description
 from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 from a2g_jax.training.validation import Validator, collect_summary
-
-#: Settings that may change on resuming, because the computation of a step does not depend on them.
-_FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
-
+from a2g_jax.training.vanished import ZeroGradients
 
 _Average = Callable[[Params], Params]
 
@@ -54,6 +54,7 @@ def train(
     resume: bool,
     progress: bool = True,
     start: Params | None = None,
+    verify: bool = False,
 ) -> Run:
     """Train a model on a corpus; the run folder can generate at any time after the first checkpoint.
 
@@ -67,15 +68,19 @@ def train(
         resume: continue from the latest checkpoint; starts again if there is none.
         progress: show a progress bar on standard error.
         start: weights of the run that ``config.source`` names, for training that starts from it.
+        verify: read all files of the corpus to compare their hashes, also those that seem unchanged since last time.
 
     Raises:
-        InputError: the folder holds a run, or another run than the one to resume.
+        InputError: the folder holds a run, another run than the one to resume, or one that another process trains; a
+            file of the corpus or the checkpoint was damaged or changed; or the corpus holds NaN.
+        OutputError: the disk is full; what was written before stays.
         TrainingError: a loss or gradient was not finite; the last good checkpoint stays.
         Interrupted: SIGINT or SIGTERM came; a checkpoint was saved.
     """
     out = Path(out)
     settings = config.train_config
     # Errors are found before anything is written.
+    verify_corpus(corpus, verify)
     model = training_model(config)
     extremes = corpus_extremes(corpus, config)
     if config.source is not None:
@@ -93,11 +98,31 @@ def train(
         corpus.array(name)
     if settings.mirror > 0:
         pose_mirror(config.space)
+    make_folder(out)
+    with locked(out / LOCK, f"{out}: is being trained"):
+        config = replace(config, body_extremes=extremes)
+        return _train(config, corpus, out, model, shape, resume, progress, start)
+
+
+def _train(
+    config: RunConfig,
+    corpus: Corpus,
+    out: Path,
+    model: Model,
+    shape: ClipShape,
+    resume: bool,
+    progress: bool,
+    start: Params | None,
+) -> Run:
+    """Train in a locked folder."""
+    settings, extremes = config.train_config, config.body_extremes
     spans = stage_spans(model, settings)
     total = spans[-1].stop
-    state = init_state(model, spans, settings.seed, start)
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
-    _check_folder(out, config, checkpoints, resume, corpus.on_demand)
+    before = check_folder(out, config, checkpoints, resume, corpus.on_demand)
+    sweep(out)
+    sweep_unfinished(checkpoints.folder)
+    state = init_state(model, spans, settings.seed, start)
     restored = checkpoints.restore(state) if resume else None
     if restored is not None:
         state = restored
@@ -106,18 +131,19 @@ def train(
         state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
     config = replace(config, body_extremes=extremes)
-    make_folder(out)
     average = weight_average(config.source, model.stages, start, out, restored is not None)
-    export = partial(_export, config, model, corpus, out, average)
-    sweep_unfinished(checkpoints.folder)
+    description = run_to_json(config, done)
+    # Without the hash of a log from which lines are about to be removed.
+    write_description(out, description, before._replace(log=None))
     with (
         _stop_requested() as stop,
         PartStream(corpus, settings.part_steps, total, arrays=shape.arrays) as parts,
         MetricsLog(out, done, settings, progress, total) as log,
     ):
-        write_json(out / RUN_FILE, run_to_json(config, done))
+        write_description(out, description, before._replace(log=log.written))
+        export = partial(_export, config, model, corpus, out, average, log)
         run = None
-        steps = _Steps(config, shape)
+        steps, zeros = _Steps(config, shape), ZeroGradients(out)
         validate = Validator(model, corpus, config)
         ends = {span.stop for span in spans}
         checked = validations(read_metrics(log.path), spans[-1].first, done)
@@ -134,6 +160,7 @@ def train(
                 values = {name: float(value) for name, value in jax.device_get(metrics).items()}
                 _check_finite(state, done, values, checkpoints)
                 log.write(done, values)
+                zeros.note(done, values)
             else:
                 log.tick(done)
             if done % settings.validate_every == 0 or done in ends:
@@ -158,50 +185,6 @@ def train(
 
 def _interrupted(out: Path, done: int, total: int) -> Interrupted:
     return Interrupted(f"{out}: stopped after step {done} of {total}; resume with --resume.")
-
-
-def _check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool, on_demand: bool) -> None:
-    if out.is_file():
-        raise InputError(f"{out}: is a file; name a folder for the run.")
-    if not (out / RUN_FILE).exists():
-        if out.is_dir() and any(out.iterdir()):
-            raise InputError(f"{out}: is not empty and holds no run; choose another folder.")
-        return
-    if not checkpoints.steps() and not (out / WEIGHTS_FILE).exists():
-        return  # stopped before its first checkpoint: nothing is lost by starting again
-    if not resume:
-        raise InputError(f"{out}: holds a run already; continue it with --resume, or choose another folder.")
-    values = read_json(out / RUN_FILE)
-    if not isinstance(values, dict) or values.get("format") != FORMAT or not isinstance(values.get("corpus"), dict):
-        raise InputError(f"{out / RUN_FILE}: is not the description of a run; restore it or choose another folder.")
-    now = json.loads(json.dumps(run_to_json(config, 0)))
-    changed = [
-        f"{key.replace('_', ' ')}: {values.get(key)}, now {now.get(key)}"
-        for key in ("model", "fps", "feature_network")
-        if values.get(key) != now.get(key)
-    ]
-    if _without_name(values.get("from")) != _without_name(now.get("from")):
-        changed.append(f"from: {values.get('from')}, now {now.get('from')}")
-    free_settings = _FREE if on_demand else _FREE | {"part_steps"}
-    for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
-        before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
-        changed += [
-            f"{name}: {before.get(name)}, now {value}"
-            for name, value in now[part].items()
-            if name not in free and before.get(name, value) != value
-        ]
-    if values["corpus"].get("fingerprint") != config.corpus["fingerprint"]:
-        changed.append("the corpus")
-    if changed:
-        raise InputError(f"{out}: was trained with other settings ({'; '.join(changed)}); resume with the same ones.")
-
-
-def _without_name(source: Any) -> Any:
-    """What a run records of its source without the name or path, which may change; the hash of the weights does not."""
-    if not isinstance(source, dict):
-        return source
-    # Runs of an earlier version record no share.
-    return {"share": 1.0} | {key: value for key, value in source.items() if key != "run"}
 
 
 #: A whole step of training.
@@ -280,12 +263,20 @@ def _check_finite(state: TrainState, step: int, values: dict[str, float], checkp
     )
 
 
-def _export(config: RunConfig, model: Model, corpus: Corpus, out: Path, average: _Average, state: TrainState) -> Run:
+def _export(
+    config: RunConfig,
+    model: Model,
+    corpus: Corpus,
+    out: Path,
+    average: _Average,
+    log: MetricsLog,
+    state: TrainState,
+) -> Run:
     """Write weights and the latent summary to the run folder, for generation."""
     params = jax.device_get(average(state.params))
     summary = collect_summary(model, params, corpus, config)
     run = Run(config, params, summary, int(state.step))
-    save_run(out, run)
+    save_run(out, run, log.written)
     return run
 
 

@@ -1,6 +1,8 @@
 """A run folder: everything that generation needs, in JSON and safetensors."""
 
+import hashlib
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
-from a2g_jax.io.files import atomic_path, sha256_file, write_json
+from a2g_jax.io.files import atomic_path, sha256_file
 from a2g_jax.metrics.body.bounds import extremes_from_json, extremes_to_json
 from a2g_jax.models.base import Model, Params
 from a2g_jax.models.registry import find_trained_model
@@ -34,10 +36,15 @@ from a2g_jax.training.run_file import (
     run_folder,
     split_settings,
 )
+from a2g_jax.training.run_hashes import Written, read_weights, write_description, write_exchange
 
 
-def save_run(folder: str | os.PathLike[str], run: Run) -> None:
-    """Write ``run.json`` and ``weights.safetensors``, each whole or not at all."""
+def save_run(folder: str | os.PathLike[str], run: Run, log: Mapping[str, Any] | None = None) -> None:
+    """Write ``run.json`` and ``weights.safetensors``: at every moment the two belong together.
+
+    Args:
+        log: ``bytes`` and ``sha256`` of the log of training so far.
+    """
     from safetensors.numpy import save
 
     folder = Path(folder)
@@ -46,10 +53,12 @@ def save_run(folder: str | os.PathLike[str], run: Run) -> None:
     arrays |= {f"summary/{name}": value for name, value in run.summary.items()}
     for name, statistics in config.statistics.items():
         arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
-    arrays = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
+    data = save({name: np.require(value, requirements="C") for name, value in arrays.items()})
+    values, written = run_to_json(config, run.steps), Written(hashlib.sha256(data).hexdigest(), log)
     with atomic_path(folder / WEIGHTS_FILE) as temporary:
-        temporary.write_bytes(save(arrays))
-    write_json(folder / RUN_FILE, run_to_json(config, run.steps))
+        temporary.write_bytes(data)
+        write_exchange(folder, values, written)
+    write_description(folder, values, written)
 
 
 def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
@@ -79,18 +88,19 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     """Read a run folder.
 
     Raises:
-        InputError: not a run, nothing trained yet, or damaged or mismatching files.
+        InputError: not a run, nothing trained yet, or damaged or mismatching files: a changed byte is found by the
+            hash of the weights in ``run.json``, and by its checksum.
     """
     from safetensors import SafetensorError
-    from safetensors.numpy import load_file
+    from safetensors.numpy import load
 
     folder = Path(folder)
-    about, values = folder / RUN_FILE, read_description(folder)
-    weights = folder / WEIGHTS_FILE
-    if not weights.is_file():
-        raise InputError(f"{weights}: there is no such file; resume training with 'a2g train ... --resume'.")
+    about, weights = folder / RUN_FILE, folder / WEIGHTS_FILE
+    if not about.is_file():
+        read_description(folder)  # which says that it is no run
+    data, values = read_weights(folder)
     try:
-        arrays = load_file(weights)
+        arrays = load(data)
     except (SafetensorError, OSError, ValueError) as error:
         raise InputError(f"{weights}: is damaged ({error}); restore it or train again.") from None
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.files import read_json
+from a2g_jax.io.sealed import read_sealed
 from a2g_jax.models.control_curves import from_percentiles
 from a2g_jax.models.entry import Entry
 
@@ -15,6 +15,9 @@ FORMAT = "a2g_jax run"
 VERSION = 1
 RUN_FILE = "run.json"
 WEIGHTS_FILE = "weights.safetensors"
+LOG_FILE = "metrics.jsonl"
+#: Entries of descriptions that have a checksum.
+SEALED_WITH = ("weights_sha256",)
 
 #: Folders of the package by the names of the runs that are shipped with it.
 SHIPPED = {"demo": "demo", "demo-flow": "demo_flow", "demo-emotion": "demo_emotion"}
@@ -44,7 +47,7 @@ def read_description(folder: Path) -> dict[str, Any]:
     about = folder / RUN_FILE
     if not about.is_file():
         raise InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
-    values = read_json(about)
+    values = read_sealed(about, SEALED_WITH)
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
     if values.get("version") != VERSION:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
-from a2g_jax.io.files import read_json, write_json
+from a2g_jax.io.sealed import read_sealed, write_sealed
 from a2g_jax.metrics.body.bounds import extremes_to_json
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.run import open_run
@@ -27,13 +27,13 @@ def add_extremes(run: str, corpus: Path) -> None:
         InputError: another corpus than that of the run, or one without extremes.
     """
     opened, about, config = Corpus.open(corpus), run_folder(run) / RUN_FILE, open_run(run).config
-    values = read_json(about)
+    values = read_sealed(about)
     if values["corpus"]["fingerprint"] != opened.fingerprint:
         raise InputError(f"{about}: was trained on another corpus than {corpus}; name the one that it was trained on.")
     found = corpus_extremes(opened, config if config.source else replace(config, body_extremes=None))
     if found is None:
         raise InputError(f"{corpus}: has less than a minute of training motion, or no rotations.")
-    write_json(about, values | {"body_extremes": extremes_to_json(found)})
+    write_sealed(about, values | {"body_extremes": extremes_to_json(found)})
 
 
 def main(arguments: list[str]) -> None:

@@ -30,6 +30,7 @@ from a2g_jax.evaluation.emotion_judge import load_emotion_judge
 from a2g_jax.features.hand_properties import PROPERTIES
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import read_json, write_json
+from a2g_jax.io.sealed import read_sealed, write_sealed
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import RUN_FILE, run_folder
@@ -108,9 +109,9 @@ def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Names
         if gain > 1.0:
             lines.append(f"{control}={gain:.2f}")
     about = run_folder(name) / RUN_FILE
-    values = read_json(about)
+    values = read_sealed(about)
     values["sampling"] |= {"control_gains": lines}
-    write_json(about, values)
+    write_sealed(about, values)
     return replace(run, config=run.config.with_sampling(control_gains=tuple(lines)))
 
 

@@ -12,10 +12,11 @@ from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import sha256_file
+from a2g_jax.io.files import json_text, sha256_file
 from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.training.run import Run, demo_feature_run, load_run, open_run
-from a2g_jax.training.run_file import RUN_FILE, SHIPPED, WEIGHTS_FILE, run_folder
+from a2g_jax.training.run_file import SHIPPED, WEIGHTS_FILE, read_description, run_folder
+from a2g_jax.training.run_hashes import LOG, WEIGHTS_HASH
 from experiments.motion.resampling import smooth_resample
 from experiments.motion.speeches import Speech, digest, source_digest
 from experiments.motion.targets import RIGHT, TRUTH
@@ -106,7 +107,10 @@ def run_row(name: str, speeches: Callable[[], list[Speech]], fps: float, samples
 
 def weights_of(folder: Path) -> str:
     """Digest of a run's weights and settings."""
-    return digest(sha256_file(folder / WEIGHTS_FILE), (folder / RUN_FILE).read_text(encoding="utf-8"))
+    values = read_description(folder)
+    # Text without the hashes, which say nothing new.
+    about = json_text({name: value for name, value in values.items() if name not in (WEIGHTS_HASH, LOG)})
+    return digest(sha256_file(folder / WEIGHTS_FILE), about)
 
 
 def feature_network(name: str) -> FeatureNetwork:

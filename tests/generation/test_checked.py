@@ -197,7 +197,7 @@ def test_nan_after_good_samples_leaves_them_with_their_checks(run, tmp_path):
     done.clear()
     with pytest.raises(InputError, match="sample 2: .*is not a number"):
         export(run, Checked(run, Broken(), strict=True), SPEECH, tmp_path / "strict", **kwargs)
-    assert list((tmp_path / "strict").iterdir()) == []
+    assert not (tmp_path / "strict").exists()
     assert done == [1, 2]
 
 

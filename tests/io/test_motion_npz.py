@@ -12,6 +12,8 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.npz import read_motion_npz, write_motion_npz
+from a2g_jax.io.untrusted import read_npz
+from tests.io.fuzz_for_tests import peak_memory
 
 
 def make(seed=0, frames=3, fps=30.0, ends=((2, (0.0, 0.1, -0.3)),)):
@@ -152,6 +154,51 @@ def test_headers_that_claim_too_much_cost_no_memory(tmp_path):
             archive.writestr("rotations.npy", header.getvalue() + bytes(100))
         with pytest.raises(InputError, match="rotations: "):
             read_motion_npz(path)
+
+
+def zeros(archive, key, shape, kind="<f4"):
+    """Write an array of zeros of any size without having it in memory."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": kind, "fortran_order": False, "shape": shape})
+    with archive.open(f"{key}.npy", "w", force_zip64=True) as file:
+        file.write(header.getvalue())
+        left, block = int(np.prod(shape)) * np.dtype(kind).itemsize, bytes(2**20)
+        while left > 0:
+            left -= file.write(block[:left])
+
+
+def test_small_files_that_unpack_to_gigabytes_cost_no_memory(tmp_path):
+    """Right headers and sizes, and a total that is only found by adding them, or one array of another shape."""
+    path, frames, joints = tmp_path / "a.npz", 400_000, 22
+    for wrong, message in ((0, "its [0-9]+ bytes unpack to [0-9]+; expected"), (1, r"root: expected .*\(400000, 3\)")):
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+            zeros(archive, "rotations", (frames, joints, 3, 3))
+            zeros(archive, "root", (frames + wrong, 3))
+            zeros(archive, "offsets", (joints, 3))
+            zeros(archive, "joint_names", (joints,), "<U8")
+            zeros(archive, "parents", (joints,), "<i4")
+            zeros(archive, "fps", (), "<f8")
+        assert path.stat().st_size < 4e6
+
+        def read(message=message):
+            with pytest.raises(InputError, match=message):
+                read_motion_npz(path)
+
+        assert peak_memory(read) < 2e6
+        with pytest.raises(InputError, match="bytes of memory"):
+            read_npz(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        zeros(archive, "rotations", (frames // 10, joints, 3, 3))
+        zeros(archive, "root", (frames // 10, 3))
+        for key, array in {
+            "offsets": np.zeros((joints, 3), np.float32),
+            "joint_names": np.array([f"joint{n}" for n in range(joints)]),
+            "parents": np.arange(joints) - 1,
+            "fps": np.float64(30.0),
+        }.items():
+            with archive.open(f"{key}.npy", "w") as file:
+                np.lib.format.write_array(file, array)
+    assert read_motion_npz(path).frames == frames // 10  # a long take that stands still is no attack
 
 
 def test_bad_motions_are_not_written(tmp_path):

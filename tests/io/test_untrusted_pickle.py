@@ -1,5 +1,7 @@
 import collections
+import datetime
 import os
+import pathlib
 import pickle
 import pickletools
 import struct
@@ -140,7 +142,6 @@ def test_calls_and_states_of_real_pickles_are_refused(protocol, tmp_path):
         (Calls(os.system, f"touch {canary}"), f"{os.system.__module__}.system"),
         (Calls(eval, f"open({str(canary)!r}, 'w')"), "eval"),
         (Calls(np.memmap, str(canary), "u1", "w+", 0, (1,)), "numpy.memmap"),
-        ([np.zeros(2), {"a": Calls(os.mkdir, str(canary))}], "mkdir"),
     ):
         error = attempt(decode_pickle, pickle.dumps(thing, protocol))
         assert name in str(error)
@@ -148,7 +149,106 @@ def test_calls_and_states_of_real_pickles_are_refused(protocol, tmp_path):
     stateful = Stateful()
     stateful.x = 1
     assert "Stateful" in str(attempt(decode_pickle, pickle.dumps(stateful, protocol)))
+    nested = [np.zeros(2), {"a": Calls(os.mkdir, str(canary)), "b": stateful, "c": 3}]
+    found = attempt(decode_pickle, pickle.dumps(nested, protocol))
+    assert found[1]["c"] == 3
+    for key, name in (("a", "mkdir"), ("b", "Stateful")):
+        with pytest.raises(InputError, match=f"{NAME}, byte .*{name}.* nothing was run"):
+            np.asarray(found[1][key])
     assert not canary.exists()
+
+
+class Tensor:
+    """Pickles as PyTorch's tensors do: a rebuilding function, storages, hooks and a state."""
+
+    def __reduce__(self):
+        return rebuild, (b"storage" * 40, 0, (2, 3), (3, 1), False, collections.OrderedDict()), {"_backward": None}
+
+
+def rebuild(*_arguments):
+    raise AssertionError("this ran")
+
+
+class Mapping(dict):
+    pass
+
+
+class Listing(list):
+    pass
+
+
+class Slots:
+    __slots__ = ("a",)
+
+    def __init__(self):
+        self.a = 1
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_what_is_refused_does_not_hinder_the_rest(protocol):
+    """Objects of many kinds beside arrays: these are read, those fail when they are used, also where shared."""
+    objects = {
+        "tensor": Tensor(),
+        "mapping": Mapping(a=1),
+        "listing": Listing([1, 2]),
+        "set": collections.Counter("aab"),
+        "class": Tensor,
+        "function": rebuild,
+        "date": datetime.datetime(2020, 1, 1),
+        "path": pathlib.PurePosixPath("a/b"),
+        "default": collections.defaultdict(list, a=[1]),
+        "records": np.zeros(2, "i4,f4"),
+        "matrix": np.zeros((1, 1)).view(np.matrix),
+        "masked": np.ma.masked_array([1, 2], [True, False]),
+    }
+    if protocol >= 2:
+        objects["slots"] = Slots()
+    poses = np.arange(12.0).reshape(2, 6)
+    value = {"before": poses, **objects, "again": dict(objects), "list": [*objects.values(), 5], "after": poses}
+    found = attempt(decode_pickle, pickle.dumps(value, protocol))
+    np.testing.assert_array_equal(found["before"], poses)
+    assert found["after"] is found["before"]
+    assert found["list"][-1] == 5
+    for key in objects:
+        for refused in (found[key], found["again"][key]):
+            for use in (len, list, np.asarray, float, bool, lambda x: x["a"], lambda x: x.shape, lambda x: x == 1):
+                with pytest.raises(InputError, match=f"{NAME}, byte "):
+                    use(refused)
+
+
+def type_of(text: bytes) -> bytes:
+    return b"cnumpy\ndtype\n(S'" + text + b"'\ntR(I3\nS'|'\nNNNI-1\nI-1\nI0\ntb"
+
+
+REPEATED = {
+    "opcodes": b"N0" * 60 + b"N.",
+    "sets": b"(" + b"N" * 20 + b"lp0\n0" + b"cbuiltins\nset\n(g0\ntR0" * 5 + b"N.",
+    "arrays of objects": type_of(b"O8")
+    + b"p1\n0("
+    + b"N" * 20
+    + b"lp0\n0"
+    + b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(I0\ntS'b'\ntR(I1\n(I20\ntg1\nI00\ng0\ntb0" * 5
+    + b"N.",
+    "references": b"(" + b"N" * 20 + b"lp0\n0(" + b"(g0\nl" * 40 + b"l.",
+}
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_the_number_of_steps_is_bounded(name):
+    limits = Limits(steps=90)
+    with pytest.raises(InputError, match="takes more than 90 steps to read"):
+        decode_pickle(REPEATED[name], NAME, limits)
+    decode_pickle(REPEATED[name], NAME, Limits(steps=1000))
+
+
+def test_memory_is_bounded_by_the_size_of_the_file():
+    """A file of a kilobyte cannot make gigabytes of arrays from one string of bytes."""
+    block = 2**20
+    head = b"B" + struct.pack("<I", block) + bytes(block) + b"q\x000" + type_of(b"u1") + b"q\x010"
+    one = b"cnumpy.core.numeric\n_frombuffer\n(h\x00h\x01J" + struct.pack("<i", block) + b"\x85S'C'\ntR"
+    assert len(attempt(decode_pickle, head + b"(" + one * 3 + b"l.")) == 3
+    with pytest.raises(InputError, match="bytes of memory"):
+        decode_pickle(head + b"(" + one * 600 + b"l.", NAME)
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.untrusted.refused import Refused
 
 NAME = "payload"
 _WATCHED = ("exec", "compile", "open", "os.", "subprocess.", "socket.", "ctypes.", "pickle.", "shutil.", "marshal.")
@@ -83,7 +84,7 @@ def assert_plain(value: Any, depth: int = 0) -> None:
         assert_plain(value.ravel().tolist(), depth + 1)
     else:
         plain = (type(None), bool, int, float, complex, str, bytes, bytearray, np.ndarray)
-        assert kind in plain or isinstance(value, np.generic | np.dtype), kind
+        assert kind in plain or isinstance(value, np.generic | np.dtype | Refused), kind
 
 
 def same(first: Any, second: Any) -> bool:

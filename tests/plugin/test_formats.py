@@ -36,7 +36,8 @@ def test_a_format_of_another_package_is_written(packages, tmp_path):
     motion = Motion(np.tile(np.eye(3, dtype=np.float32), (5, 1, 1, 1)), np.zeros((5, 3), np.float32), skeleton, 30.0)
     out = tmp_path / "out"
     for number in (3, 0):  # files of the first call, of motions that the second one has not, go
-        MotionFiles(out, "sample", ("csv", "html")).write(number, motion)
+        with MotionFiles(out, ("sample",), ("csv", "html")) as files:
+            files.write(number, motion)
     assert [path.name for path in out.iterdir()] == ["sample_00.csv"]
     assert (out / "sample_00.csv").read_text() == "5"
 
@@ -47,5 +48,5 @@ def test_a_broken_format_is_named_when_it_is_chosen_and_only_then(packages, tmp_
     assert "gone" in capsys.readouterr().out
     for name, message in (("gone", "the package toy-formats 1.0"), ("odd", "expected a MotionFormat; got int")):
         with pytest.raises(InputError, match=message):
-            MotionFiles(tmp_path / "out", "sample", (name,))
+            MotionFiles(tmp_path / "out", ("sample",), (name,))
         assert not (tmp_path / "out").exists()

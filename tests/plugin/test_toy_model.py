@@ -127,6 +127,7 @@ def test_changed_sampling_settings_survive_a_resume(toy_run, toy_corpus, tmp_pat
     shutil.copytree(toy_run, folder)
     values = json.loads((folder / "run.json").read_text())
     values["sampling"]["scale"] = 0.25
+    values["checksum"] = None  # accepts the edit
     (folder / "run.json").write_text(json.dumps(values))
     assert main(["train", MODEL, "--corpus", str(toy_corpus.path), "--out", str(folder), "--resume"]) == 0
     assert json.loads((folder / "run.json").read_text())["sampling"] == {"scale": 0.25}

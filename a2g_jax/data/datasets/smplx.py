@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.untrusted import check_read
 from a2g_jax.talker.skeleton import TALKER_HANDS_SKELETON, TALKER_SKELETON
 
 #: Joints of the body, of jaw and eyes, and of both hands.
@@ -75,6 +76,7 @@ def float_array(value: object, shapes: tuple[tuple[int, ...], ...], place: str) 
     Raises:
         InputError: not numbers, or of another shape.
     """
+    check_read(value)
     try:
         array = np.asarray(value) if isinstance(value, np.ndarray | list | tuple) else None
     except ValueError:  # rows of unequal length

@@ -13,7 +13,7 @@ from a2g_jax.generation.talk.page import write_talk_page
 from a2g_jax.generation.talk.request import TalkRequest, truth_from_json
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
-from a2g_jax.io.files import write_json
+from a2g_jax.io.files import check_folder_writable, write_json
 from a2g_jax.io.textgrid import write_words
 from a2g_jax.recording import Recording
 from a2g_jax.talker.recordings import resample_motion
@@ -70,26 +70,27 @@ def deliver_talk(
         InputError: a folder that cannot be used, or too large a page.
     """
     plan = plan_from_json(recording.annotations["speech"])
+    check_folder_writable(out)
     if PAGE in formats:
         check_page_size(samples, recording.motion.frames, recording.motion.skeleton.joints)
-    files = MotionFiles(out, "motion", formats, _OTHERS)
-    if "wav" in formats:
-        write_audio(files.folder / "speech.wav", recording.audio, recording.sample_rate)
-    if "textgrid" in formats:
-        write_words(files.folder / "speech.TextGrid", recording.words, plan.seconds, tiers=speech_tiers(plan))
-    if "json" in formats:
-        write_json(files.folder / "speech.json", {**_made(recording, request), "plan": plan_to_json(plan)})
-    shown = []
-    for number, (whole, truth) in enumerate(right_motions(recording, samples, request.seed)):
-        motion = request.in_view(whole)
-        files.write(number, motion)
+    with MotionFiles(out, ("motion",), formats, _OTHERS) as files:
+        if "wav" in formats:
+            write_audio(files.folder / "speech.wav", recording.audio, recording.sample_rate)
+        if "textgrid" in formats:
+            write_words(files.folder / "speech.TextGrid", recording.words, plan.seconds, tiers=speech_tiers(plan))
         if "json" in formats:
-            write_json(files.folder / f"truth_{number:02d}.json", _truth(recording, motion, truth, number, request))
-        if PAGE in formats:
-            shown.append((motion, truth))
-        report(number + 1)
-    if shown:
-        write_talk_page(files.folder / "index.html", recording, shown)
+            write_json(files.folder / "speech.json", {**_made(recording, request), "plan": plan_to_json(plan)})
+        shown = []
+        for number, (whole, truth) in enumerate(right_motions(recording, samples, request.seed)):
+            motion = request.in_view(whole)
+            files.write(number, motion)
+            if "json" in formats:
+                write_json(files.folder / f"truth_{number:02d}.json", _truth(recording, motion, truth, number, request))
+            if PAGE in formats:
+                shown.append((motion, truth))
+            report(number + 1)
+        if shown:
+            write_talk_page(files.folder / "index.html", recording, shown)
     each = {"json": 1 + samples, "wav": 1, "textgrid": 1, PAGE: 1}
     return {kind: each.get(kind, samples) for kind in formats}
 

@@ -26,7 +26,7 @@ def plain_type(text: object, budget: Budget, at: int, objects: bool = False) -> 
             return np.dtype(text)
         if objects and _OBJECTS.fullmatch(text):
             return np.dtype(object)
-    raise budget.error(at, f"has an array of type {clip(text)}; expected plain numbers or text; {CONVERT}.")
+    raise budget.refused(at, f"has an array of type {clip(text)}; expected plain numbers or text; {CONVERT}.")
 
 
 def check_shape(shape: object, budget: Budget, at: int) -> tuple[int, ...]:
@@ -80,6 +80,7 @@ def object_array(items: list, shape: tuple[int, ...], order: str, budget: Budget
     if len(items) != math.prod(shape):
         raise budget.damage(at, f"an array of shape {clip(shape)} comes with {len(items)} values")
     budget.charge(8 * len(items) + 128, at)
+    budget.work(len(items), at)
     flat = np.empty(len(items), object)
     for index, item in enumerate(items):  # assigning a slice would unpack lists
         flat[index] = item

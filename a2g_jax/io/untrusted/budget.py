@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.untrusted.refused import RefusedError
 
 #: Remedy for content that is refused although the file is not damaged.
 CONVERT = "convert it where you trust it: load it there and save its arrays with numpy.savez"
@@ -15,10 +16,12 @@ class Limits:
     Attributes:
         size: bytes of memory, roughly; a part that is shared within a value counts once for each reference.
         depth: levels of nested containers.
+        steps: opcodes and elements of containers, which bounds the time to about two seconds.
     """
 
     size: int = 2 * 2**30
     depth: int = 50
+    steps: int = 2_000_000
 
 
 class Budget:
@@ -28,6 +31,12 @@ class Budget:
         self.name = name
         self.limits = limits
         self.left = limits.size
+        self.most = limits.size
+        self.steps = limits.steps
+
+    def bound(self, size: int) -> None:
+        """Lower the limit to ``size`` bytes."""
+        self.left = self.most = min(self.most, size)
 
     def charge(self, size: int, at: int) -> None:
         """Account for ``size`` more bytes, needed at byte ``at`` of the data.
@@ -38,8 +47,24 @@ class Budget:
         self.left -= size
         if self.left < 0:
             raise self.error(
-                at, f"would take more than {self.limits.size} bytes of memory; if you trust the file, raise the limit."
+                at, f"would take more than {self.most} bytes of memory; if you trust the file, raise the limit."
             )
+
+    def work(self, steps: int, at: int) -> None:
+        """Account for ``steps`` more elements to be visited.
+
+        Raises:
+            InputError: the limit is exceeded.
+        """
+        self.steps -= steps
+        if self.steps < 0:
+            raise self.error(
+                at, f"takes more than {self.limits.steps} steps to read; if you trust the file, raise the limit."
+            )
+
+    def refused(self, at: int, message: str) -> RefusedError:
+        """An error for content that is not built."""
+        return RefusedError(str(self.error(at, message)))
 
     def error(self, at: int, message: str) -> InputError:
         """An error that names the data, the byte and the fault."""

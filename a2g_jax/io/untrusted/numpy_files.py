@@ -6,6 +6,7 @@ decoded as by :func:`~a2g_jax.io.untrusted.pickles.decode_pickle`.
 """
 
 import io
+import math
 import os
 import re
 import struct
@@ -24,6 +25,8 @@ from a2g_jax.io.untrusted.pickles import decode_with
 
 _MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
+#: Memory that an archive may take: this, and so much for each of its bytes; motion packs to half.
+_LEAST, _TIMES = 2**28, 100
 #: Largest single read in bytes; an archive of arrays has no longer list of members.
 _LARGEST_READ = 2**20
 _ITEM = r"'descr': *+'([^']{1,15})'|'fortran_order': *+(True|False)|'shape': *+\(([0-9L, ]{0,999})\)"
@@ -73,25 +76,68 @@ def read_npz(
         InputError: no such file, not an archive, damaged, a missing array, or for the reasons of :func:`read_npy`.
     """
     path = check_readable(path, "an .npz archive")
-    budget = Budget(str(path), limits or Limits())
     with path.open("rb") as file:
-        try:
-            archive = zipfile.ZipFile(_SmallReads(file))
-        except InputError:
-            raise
-        except _DAMAGE:
-            raise InputError(f"{path}: is not an .npz archive, or is damaged; copy or download it again.") from None
-        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
-        missing = [name for name in names or () if name not in members]
-        if missing:
-            raise InputError(f"{path}: has no array {clip(missing[0])}; it has {_some(list(members))}.")
-        return {name: _member(archive, members[name], objects, budget) for name in names or members}
+        return read_npz_file(file, str(path), names, objects=objects, limits=limits)
+
+
+def read_npz_file(
+    file: BinaryIO | io.BytesIO,
+    path: str,
+    names: Sequence[str] | None = None,
+    *,
+    objects: bool = False,
+    limits: Limits | None = None,
+) -> dict[str, np.ndarray]:
+    """As :func:`read_npz`, of an open file that errors call ``path``.
+
+    The headers of all arrays are read first, so that nothing is unpacked of a file that announces too much, or other
+    shapes than it has bytes for.
+    """
+    budget = Budget(path, limits or Limits())
+    if limits is None:
+        budget.bound(_LEAST + _TIMES * file.seek(0, os.SEEK_END))
+        file.seek(0)
+    try:
+        archive = zipfile.ZipFile(_SmallReads(file))
+    except InputError:
+        raise
+    except _DAMAGE:
+        raise InputError(f"{path}: is not an .npz archive, or is damaged; copy or download it again.") from None
+    members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+    missing = [name for name in names or () if name not in members]
+    if missing:
+        raise InputError(f"{path}: has no array {clip(missing[0])}; it has {_some(list(members))}.")
+    chosen = {name: members[name] for name in names or members}
+    announced = 0
+    for info in chosen.values():
+        announced += info.file_size
+        if announced > budget.left:
+            budget.charge(announced, info.header_offset)
+        _check_header(archive, info, budget)
+    return {name: _member(archive, info, objects, budget) for name, info in chosen.items()}
+
+
+def _check_header(archive: zipfile.ZipFile, info: zipfile.ZipInfo, whole: Budget) -> None:
+    """Compare the shape in an array's header with its size."""
+    name = f"{whole.name}, {clip(info.filename)}"
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise InputError(f"{name}: is packed in a way that NumPy never uses; {CONVERT}.")
+    try:
+        with archive.open(info) as file:
+            beginning = file.read(min(_LONGEST_HEADER + 12, info.file_size))
+    except _DAMAGE as error:
+        raise InputError(f"{name}: is damaged ({_reason(error)}); copy or download it again.") from None
+    budget = Budget(name, whole.limits)
+    dtype, shape, _, start = _header(beginning, budget)
+    expected = math.prod(shape) * dtype.itemsize
+    if not dtype.hasobject and start + expected != info.file_size:
+        raise budget.damage(
+            start, f"{dtype} of shape {clip(shape)} takes {expected} bytes and has {info.file_size - start}"
+        )
 
 
 def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whole: Budget) -> np.ndarray:
     name = f"{whole.name}, {clip(info.filename)}"
-    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise InputError(f"{name}: is packed in a way that NumPy never uses; {CONVERT}.")
     whole.charge(info.file_size, info.header_offset)
     try:
         with archive.open(info) as file:
@@ -103,7 +149,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, objects: bool, whol
     except _DAMAGE as error:
         raise InputError(f"{name}: is damaged ({_reason(error)}); copy or download it again.") from None
     budget = Budget(name, whole.limits)
-    budget.left = whole.left
+    budget.left, budget.most = whole.left, whole.most
     array = _array(data, objects, budget)
     whole.left = budget.left
     return array
@@ -150,7 +196,7 @@ def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[in
 class _SmallReads(io.RawIOBase):
     """A file that refuses large reads, such as those of ``zipfile`` for the sizes that a file claims."""
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: BinaryIO | io.BytesIO) -> None:
         self.file = file
 
     def readable(self) -> bool:

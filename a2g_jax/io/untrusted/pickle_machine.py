@@ -4,9 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.untrusted.budget import Budget, clip
+from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
 from a2g_jax.io.untrusted.pickle_objects import Unfinished, find_global, finish, reduce
-from a2g_jax.io.untrusted.pickle_opcodes import Opcodes
+from a2g_jax.io.untrusted.pickle_opcodes import REFUSED, Opcodes
+from a2g_jax.io.untrusted.refused import Refused, RefusedError, check_read
 from a2g_jax.io.untrusted.values import check_key
 
 #: Bytes charged for a value and its place on the stack.
@@ -15,9 +16,14 @@ _HIGHEST_PROTOCOL = 5
 
 
 class PickleMachine:
-    """Executes one pickle as data."""
+    """Executes one pickle as data.
 
-    def __init__(self, data: bytes, budget: Budget) -> None:
+    Args:
+        placeholders: whether objects that are refused become :class:`Refused` instead of raising their error.
+    """
+
+    def __init__(self, data: bytes, budget: Budget, placeholders: bool = False) -> None:
+        self.placeholders = placeholders
         self.opcodes = Opcodes(data, budget)
         self.budget = budget
         self.stack: list[Any] = []
@@ -33,7 +39,7 @@ class PickleMachine:
         """The value of the whole pickle.
 
         Raises:
-            InputError: damaged, or with other than plain values.
+            InputError: damaged, or with other than plain values (with ``placeholders``, if it is one as a whole).
         """
         for name, argument in self.opcodes:
             act = _ACTIONS.get(name)
@@ -45,6 +51,7 @@ class PickleMachine:
             raise self.damage("it stops with values left over")
         if self.opcodes.left:
             raise self.damage(f"{self.opcodes.left} bytes follow its end")
+        check_read(value)
         return value
 
     def damage(self, what: str) -> InputError:
@@ -59,7 +66,20 @@ class PickleMachine:
             raise self.damage("it uses a value of an empty stack")
         return self.stack.pop()
 
+    def refuse(self, error: RefusedError) -> None:
+        """Push a placeholder, or raise the error."""
+        if not self.placeholders:
+            raise error
+        self.push(Refused(str(error)))
+
+    def refuse_opcode(self, name: str) -> None:
+        what = f"holds {REFUSED[name]}, which is refused, and nothing was run; {CONVERT}."
+        self.refuse(self.budget.refused(self.at, what))
+
     def top(self, kind: type) -> Any:
+        """The container on the stack; a new one, which is dropped, on top of an object that was refused."""
+        if self.stack and isinstance(self.stack[-1], Refused):
+            return kind()
         if not self.stack or type(self.stack[-1]) is not kind:
             raise self.damage(f"it adds to a {kind.__name__} that does not exist")
         return self.stack[-1]
@@ -111,15 +131,55 @@ class PickleMachine:
         name, module = self.pop(), self.pop()
         if type(name) is not str or type(module) is not str:
             raise self.damage("a global without a name")
-        self.push(find_global(module, name, self.budget, self.at))
+        self.find(module, name)
+
+    def find(self, module: str, name: str) -> None:
+        self.budget.work(3, self.at)  # slower than other opcodes
+        try:
+            self.push(find_global(module, name, self.budget, self.at))
+        except RefusedError as error:
+            self.refuse(error)
 
     def call(self) -> None:
         arguments, function = self.pop(), self.pop()
-        self.push(reduce(function, arguments, self.budget, self.at), _CONTAINER)
+        try:
+            self.push(reduce(function, arguments, self.budget, self.at), _CONTAINER)
+        except RefusedError as error:
+            self.refuse(error)
 
     def build(self) -> None:
         state, thing = self.pop(), self.pop()
-        self.push(finish(thing, state, self.budget, self.at))
+        try:
+            self.push(finish(thing, state, self.budget, self.at))
+        except RefusedError as error:
+            self.refuse(error)
+            if isinstance(thing, Unfinished):  # which the memo may hold
+                thing.value, thing.done = self.stack[-1], True
+
+    def instance(self, name: str, arguments: int) -> None:
+        """An instance of a class, which is below its arguments on the stack."""
+        for _ in range(arguments):
+            self.pop()
+        known = self.pop()
+        if isinstance(known, Refused):
+            self.refuse(known.error)
+        else:
+            self.refuse_opcode(name)
+
+    def marked_instance(self) -> None:
+        items = self.marked()
+        if items and isinstance(items[0], Refused):
+            self.refuse(items[0].error)
+        else:
+            self.refuse_opcode("OBJ")
+
+    def named_instance(self) -> None:
+        self.marked()
+        self.refuse_opcode("INST")
+
+    def stored_object(self) -> None:
+        self.pop()
+        self.refuse_opcode("BINPERSID")
 
     def tuple_of(self, count: int) -> None:
         items = [self.pop() for _ in range(count)][::-1]
@@ -233,8 +293,20 @@ _ACTIONS: dict[str, Callable[[PickleMachine, Any], None]] = {
     "MEMOIZE": lambda m, _: m.remember(len(m.memo)),
     **dict.fromkeys(("GET", "BINGET", "LONG_BINGET"), PickleMachine.recall),
     # Globals and calls.
-    "GLOBAL": lambda m, names: m.push(find_global(names[0], names[1], m.budget, m.at)),
+    "GLOBAL": lambda m, names: m.find(names[0], names[1]),
     "STACK_GLOBAL": lambda m, _: m.global_stack(),
     "REDUCE": lambda m, _: m.call(),
     "BUILD": lambda m, _: m.build(),
+    # What is never built.
+    "NEWOBJ": lambda m, _: m.instance("NEWOBJ", 1),
+    "NEWOBJ_EX": lambda m, _: m.instance("NEWOBJ_EX", 2),
+    "OBJ": lambda m, _: m.marked_instance(),
+    "INST": lambda m, _: m.named_instance(),
+    "PERSID": lambda m, _: m.refuse_opcode("PERSID"),
+    "BINPERSID": lambda m, _: m.stored_object(),
+    "EXT1": lambda m, _: m.refuse_opcode("EXT1"),
+    "EXT2": lambda m, _: m.refuse_opcode("EXT2"),
+    "EXT4": lambda m, _: m.refuse_opcode("EXT4"),
+    "NEXT_BUFFER": lambda m, _: m.refuse_opcode("NEXT_BUFFER"),
+    "READONLY_BUFFER": lambda m, _: m.refuse_opcode("READONLY_BUFFER"),
 }

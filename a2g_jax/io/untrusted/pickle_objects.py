@@ -9,6 +9,7 @@ import numpy as np
 from a2g_jax.errors import InputError
 from a2g_jax.io.untrusted.arrays import check_shape, object_array, plain_array, plain_type
 from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
+from a2g_jax.io.untrusted.refused import first_refused
 from a2g_jax.io.untrusted.values import check_key
 
 _MODULES = {"__builtin__": "builtins", "copy_reg": "copyreg"}
@@ -40,7 +41,7 @@ def find_global(module: str, name: str, budget: Budget, at: int) -> Global:
     """The marker for an allowed global.
 
     Raises:
-        InputError: any other global, with its name.
+        RefusedError: any other global, with its name.
     """
     root, _, rest = module.partition(".")
     root = _MODULES.get(root, root)
@@ -50,18 +51,23 @@ def find_global(module: str, name: str, budget: Budget, at: int) -> Global:
     if full in _REDUCERS or full in ("numpy.ndarray", "copyreg._reconstructor", "builtins.object"):
         return Global(full)
     hint = _HINTS.get(root, CONVERT)
-    raise budget.error(at, f"refers to {clip(f'{module}.{name}', 120)}, which is refused, and nothing was run; {hint}.")
+    raise budget.refused(
+        at, f"refers to {clip(f'{module}.{name}', 120)}, which is refused, and nothing was run; {hint}."
+    )
 
 
 def reduce(function: Any, arguments: Any, budget: Budget, at: int) -> Any:
     """The result of ``REDUCE``: the object that ``function`` would build from ``arguments``.
 
     Raises:
-        InputError: the function or its arguments are not allowed.
+        RefusedError: the function or its arguments are not allowed.
+        InputError: damaged, or beyond the limits.
     """
+    if (refused := first_refused((function, arguments))) is not None:
+        raise refused.error
     if not isinstance(function, Global) or function.name not in _REDUCERS:
         name = function.name if isinstance(function, Global) else clip(function)
-        raise budget.error(at, f"calls {name}, which is refused, and nothing was run; {CONVERT}.")
+        raise budget.refused(at, f"calls {name}, which is refused, and nothing was run; {CONVERT}.")
     if type(arguments) is not tuple:
         raise budget.damage(at, f"{function.name} without a tuple of arguments")
     return _REDUCERS[function.name](arguments, budget, at)
@@ -71,10 +77,13 @@ def finish(thing: Any, state: Any, budget: Budget, at: int) -> Any:
     """The result of ``BUILD``: the completed array or type.
 
     Raises:
-        InputError: any other object, or an invalid state.
+        RefusedError: any other object, or an invalid state.
+        InputError: damaged, or beyond the limits.
     """
+    if (refused := first_refused((thing, state))) is not None:
+        raise refused.error
     if not isinstance(thing, Unfinished) or thing.done:
-        raise budget.error(at, f"sets the state of {_named(thing)}, which is refused; {CONVERT}.")
+        raise budget.refused(at, f"sets the state of {_named(thing)}, which is refused; {CONVERT}.")
     if thing.kind == "array":
         thing.value = _content(state, budget, at)
     else:
@@ -88,7 +97,7 @@ def _named(thing: Any) -> str:
 
 
 def _wrong(name: str, budget: Budget, at: int) -> InputError:
-    return budget.error(at, f"gives {name} arguments that NumPy and Python never write; {CONVERT}.")
+    return budget.refused(at, f"gives {name} arguments that NumPy and Python never write; {CONVERT}.")
 
 
 def _array(arguments: tuple, budget: Budget, at: int) -> Unfinished:
@@ -96,7 +105,7 @@ def _array(arguments: tuple, budget: Budget, at: int) -> Unfinished:
         case (Global(name="numpy.ndarray"), (0,), b"b" | "b"):
             return Unfinished("array")
     if arguments and isinstance(arguments[0], Global):
-        raise budget.error(at, f"rebuilds an array of class {arguments[0].name}, which is refused; {CONVERT}.")
+        raise budget.refused(at, f"rebuilds an array of class {arguments[0].name}, which is refused; {CONVERT}.")
     raise _wrong("an array", budget, at)
 
 
@@ -123,7 +132,7 @@ def _byte_order(dtype: np.dtype, state: Any, budget: Budget, at: int) -> np.dtyp
         case (3 | 4, "<" | ">" | "=" | "|" as order, None, None, None, int() as size, *_):
             if size in (-1, dtype.itemsize) and len(state) <= 9:
                 return dtype if order == "|" else dtype.newbyteorder(order)
-    raise budget.error(at, f"has an array of records or dates; expected plain numbers or text; {CONVERT}.")
+    raise budget.refused(at, f"has an array of records or dates; expected plain numbers or text; {CONVERT}.")
 
 
 def _scalar(arguments: tuple, budget: Budget, at: int) -> Any:
@@ -190,6 +199,7 @@ def _set(kind: Callable) -> Callable:
         match arguments:
             case ([*members],) if type(arguments[0]) is list:
                 budget.charge(64 * len(members), at)
+                budget.work(len(members), at)
                 for member in members:
                     check_key(member, members, budget, at)
                 return kind(members)
@@ -203,6 +213,7 @@ def _ordered(arguments: tuple, budget: Budget, at: int) -> dict:
     pairs = arguments[0] if len(arguments) == 1 else []
     if len(arguments) > 1 or type(pairs) is not list:
         raise _wrong("collections.OrderedDict", budget, at)
+    budget.work(2 * len(pairs), at)
     for pair in pairs:
         if type(pair) not in (list, tuple) or len(pair) != 2:
             raise _wrong("collections.OrderedDict", budget, at)

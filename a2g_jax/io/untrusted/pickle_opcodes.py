@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
 from a2g_jax.errors import InputError
-from a2g_jax.io.untrusted.budget import CONVERT, Budget
+from a2g_jax.io.untrusted.budget import Budget
 
 _LONGEST_INTEGER = 1024
 _LONGEST_NAME = 1024
@@ -21,7 +21,7 @@ _LONGEST = {
     "LONG": 2 * _LONGEST_INTEGER,
     "LONG1": _LONGEST_INTEGER,
     "LONG4": _LONGEST_INTEGER,
-    **dict.fromkeys(("FLOAT", "GLOBAL", "PUT", "GET"), _LONGEST_NAME),
+    **dict.fromkeys(("FLOAT", "GLOBAL", "INST", "PERSID", "PUT", "GET"), _LONGEST_NAME),
 }
 #: Bytes of memory that a byte of the argument may take when decoded.
 _COST = {
@@ -30,7 +30,8 @@ _COST = {
     **dict.fromkeys(("BINUNICODE", "SHORT_BINUNICODE", "BINUNICODE8"), 4),
     "UNICODE": 8,
 }
-_REFUSED = {
+#: What opcodes that are refused hold.
+REFUSED = {
     **dict.fromkeys(("PERSID", "BINPERSID"), "a persistent id, as torch.save writes"),
     **dict.fromkeys(("EXT1", "EXT2", "EXT4"), "a registered extension"),
     **dict.fromkeys(("NEXT_BUFFER", "READONLY_BUFFER"), "a buffer kept outside the file"),
@@ -46,7 +47,7 @@ class Opcodes:
         left: bytes after what was read.
 
     Raises:
-        InputError: an unknown or refused opcode, or an argument that is damaged or beyond the limits.
+        InputError: an unknown opcode, too many, or an argument that is damaged or beyond the limits.
     """
 
     def __init__(self, data: bytes, budget: Budget) -> None:
@@ -61,7 +62,7 @@ class Opcodes:
         return len(self._data) - self._position
 
     def __iter__(self) -> Iterator[tuple[str, Any]]:
-        data, everything = self._data, len(self._data)
+        data, everything, budget = self._data, len(self._data), self._budget
         while True:
             self.at = self._position
             if self.at >= everything:
@@ -73,9 +74,9 @@ class Opcodes:
             name, read = known
             if name == "STOP":
                 return
-            if name in _REFUSED:
-                what = _REFUSED[name]
-                raise self._budget.error(self.at, f"holds {what}, which is refused, and nothing was run; {CONVERT}.")
+            budget.steps -= 1
+            if budget.steps < 0:
+                budget.work(0, self.at)
             yield name, None if read is None else self._argument(name, read)
 
     def _argument(self, name: str, read: Callable[[Any], Any]) -> Any:
@@ -126,7 +127,11 @@ def _module_and_name(source: Opcodes) -> tuple[str, str]:
     return source.readline()[:-1].decode("utf-8"), source.readline()[:-1].decode("utf-8")
 
 
-_OWN: dict[str, Callable[[Opcodes], Any]] = {"STRING": _byte_string, "GLOBAL": _module_and_name}
+_OWN: dict[str, Callable[[Opcodes], Any]] = {
+    "STRING": _byte_string,
+    "GLOBAL": _module_and_name,
+    "INST": _module_and_name,
+}
 #: Name of each opcode and the function that reads its argument.
 _OPCODES = {
     ord(opcode.code): (opcode.name, _OWN.get(opcode.name) or (opcode.arg.reader if opcode.arg else None))

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
+from a2g_jax.io.untrusted.refused import Refused, check_read
 
 #: Bytes charged for a slot in a container.
 SLOT = 16
@@ -23,6 +24,8 @@ _TUPLE_KEY = 32
 def check_value(value: Any, budget: Budget, at: int) -> None:
     """Refuse values that are not plain, contain themselves, nest too deeply, or are too large when written out.
 
+    Placeholders for what was refused pass.
+
     A few bytes can describe a list that holds the same list twice, which holds the same list twice ...: it is small in
     memory, but traversing it takes exponential time. So each value counts once for each reference.
 
@@ -40,6 +43,9 @@ def check_value(value: Any, budget: Budget, at: int) -> None:
     while frames:
         frame = frames[-1]
         for member in frame[1]:
+            budget.steps -= 1
+            if budget.steps < 0:
+                budget.work(0, at)
             if not _is_container(member):
                 frame[2] += _leaf(member, budget, at)
                 continue
@@ -76,6 +82,7 @@ def check_key(key: Any, owner: dict | set | list, budget: Budget, at: int) -> No
     else:
         parts = (key,)
     for part in parts:
+        check_read(part)
         if type(part) not in _KEYS and not isinstance(part, _NUMPY_KEYS):
             raise budget.error(
                 at, f"has a key of type {type(part).__name__}; expected text, numbers or tuples of them."
@@ -102,7 +109,7 @@ def _leaf(value: Any, budget: Budget, at: int) -> int:
         return SLOT + len(value)
     if kind is np.ndarray or isinstance(value, np.generic):
         return SLOT + int(value.nbytes)
-    if isinstance(value, np.dtype):
+    if isinstance(value, np.dtype | Refused):
         return SLOT
     raise budget.error(at, f"has {clip(value)} where a plain value is expected; {CONVERT}.")
 

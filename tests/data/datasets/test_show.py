@@ -84,7 +84,7 @@ class Hostile:
             {"body_pose_axis": np.zeros((0, 63)), "global_orient": np.zeros((0, 3)), "transl": np.zeros((0, 3))},
             "no fra",
         ),
-        ({"betas": Hostile()}, "print"),
+        ({"transl": Hostile()}, "print"),
     ],
 )
 def test_wrong_fits(tmp_path, change, message, capsys):
@@ -119,3 +119,28 @@ def test_missing_and_damaged_files(tmp_path):
     path.write_bytes(pickle.dumps(3))
     with pytest.raises(InputError, match="s.pkl: holds a int"):
         DATASET.read(first, 16000)
+
+
+def rebuild(*_arguments):
+    raise AssertionError("this ran")
+
+
+class Tensor:
+    """Pickles as PyTorch's tensors do."""
+
+    def __reduce__(self):
+        return rebuild, (b"storage", 0, (), (), False, {})
+
+
+def test_a_fit_with_tensors_that_are_not_needed(tmp_path):
+    """SHOW's own files hold a tensor among their losses."""
+    fit = made_up_fit(9)
+    write_take(tmp_path / "oliver/v/train/s", fit)
+    (plain,) = (DATASET.read(take, 16000) for take in DATASET.find(tmp_path))
+    path = tmp_path / "oliver/v/train/s/s.pkl"
+    path.write_bytes(pickle.dumps(fit | {"losses_to_log": {"sil_loss": Tensor()}, "betas": Tensor()}))
+    (found,) = (DATASET.read(take, 16000) for take in DATASET.find(tmp_path))
+    np.testing.assert_array_equal(found.motion.rotations, plain.motion.rotations)
+    path.write_bytes(pickle.dumps(fit | {"body_pose_axis": Tensor()}))
+    with pytest.raises(InputError, match=r"s\.pkl, byte .*rebuild', which is refused"):
+        DATASET.read(DATASET.find(tmp_path)[0], 16000)
