@@ -175,7 +175,7 @@ def test_early_messages_are_those_of_the_library(tmp_path, monkeypatch):
         (["train", "audio2gestures", "--settings", "--audio-channels", ""], "expected numbers above 0"),
         (["train", "audio2gestures", "--settings", "--learning-rate", "nan"], "expected a number above 0"),
         (["prepare", "folder", ".", "--minutes", "3", "--out", "c"], "--minutes is for"),
-        (["prepare", "talker", "--out", "/proc/nothing/c", "--minutes", "1"], "cannot be made"),
+        (["prepare", "talker", "--out", "/proc/nothing/c", "--minutes", "1"], "cannot be written"),
     ],
 )
 def test_bad_usage(capsys, tmp_path, monkeypatch, arguments, message):

@@ -100,7 +100,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         read_description(folder)  # which says that it is no run
     data, values = read_weights(folder)
     try:
-        arrays = load(data)
+        arrays = dict(sorted(load(data).items()))  # they come in no order
     except (SafetensorError, OSError, ValueError) as error:
         raise InputError(f"{weights}: is damaged ({error}); restore it or train again.") from None
     try:

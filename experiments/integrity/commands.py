@@ -18,7 +18,7 @@ _TINY = (
     " --clip-frames 16 --specific-frames 1 --specific-jitter 0 --smoothing 0 --stored-codes false"
     f" --adversarial-steps 0 {_STEPS}"
 )
-_FLOW = f"--flow-steps 2 --hidden 8 --clip-frames 60 --lookahead-frames 12 --audio-channels 8 {_STEPS}"
+_FLOW = f"--flow-steps 2 --hidden 8 --clip-frames 80 --lookahead-frames 36 --audio-channels 8 {_STEPS}"
 
 
 class Command(NamedTuple):

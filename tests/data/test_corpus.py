@@ -129,12 +129,12 @@ def test_damaged_corpora(copy, tmp_path):
     (copy / "manifest.json").write_text(json.dumps(manifest))
     statistics = (copy / "statistics.npz").read_bytes()
     (copy / "statistics.npz").write_bytes(statistics[: len(statistics) // 2])
-    with pytest.raises(InputError, match=r"statistics\.npz: cannot be read"):
+    with pytest.raises(InputError, match=r"statistics\.npz: differs from its hash"):
         Corpus.open(copy)
     (copy / "statistics.npz").write_bytes(statistics)
     pose = (copy / "pose.npy").read_bytes()
     (copy / "pose.npy").write_bytes(pose[: len(pose) // 2])
-    with pytest.raises(InputError, match=r"pose\.npy: cannot be read"):
+    with pytest.raises(InputError, match=r"pose\.npy: has [0-9]+ bytes, its header says [0-9]+"):
         Corpus.open(copy)
     np.save(copy / "pose.npy", np.zeros((3, 22, 6), np.float32))
     with pytest.raises(InputError, match=r"pose\.npy: expected float32"):

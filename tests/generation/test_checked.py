@@ -224,6 +224,7 @@ def test_extremes_in_a_run(toy_run_config, toy_corpus, tmp_path, monkeypatch):
         np.testing.assert_allclose(again.high[name], values, rtol=1e-5)
     about = json.loads((tmp_path / "run.json").read_text())
     del about["body_extremes"]
+    about["checksum"] = None
     (tmp_path / "run.json").write_text(json.dumps(about))
     assert load_run(tmp_path).config.body_bounds.source == "any person"
     (tmp_path / "run.json").write_text(json.dumps(about | {"body_extremes": {"turn": [1.0]}}))
@@ -245,4 +246,4 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
     assert "sample 0: OUTSIDE THE BOUNDS OF A BODY after 4 draws: 2.0" in capsys.readouterr().out
     assert main([*command, "--out", str(tmp_path / "worse"), "--strict"]) == 2
     assert "L_Elbow" in capsys.readouterr().err
-    assert list((tmp_path / "worse").iterdir()) == []
+    assert not (tmp_path / "worse").exists()

@@ -170,7 +170,8 @@ def test_nan_in_a_corpus(tmp_path):
     pose = np.load(path / "pose.npy")
     pose[700, 3, 2] = np.inf
     np.save(path / "pose.npy", pose)
-    (found,) = (x for x in inspect(path).findings if x.severity == "warning")
+    damaged, found = (x for x in inspect(path).findings if x.severity == "warning")
+    assert (damaged.code, damaged.place.path) == ("damaged", "pose.npy")
     assert (found.code, found.place.recording) == ("nan", "1")
     assert "[100, 3, 2]" in found.message
 
