@@ -85,7 +85,7 @@ def changed_settings(stored: Any, changed: Any) -> str:
         value = getattr(changed, field.name)
         if field.name != "controls" and value != getattr(stored, field.name):
             shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
-            found.append(f"{field.name.replace('_', ' ')} {shown}")
+            found.append(f"{field.metadata.get('flag', field.name).replace('-', ' ').replace('_', ' ')} {shown}")
     return ", ".join(found)
 
 

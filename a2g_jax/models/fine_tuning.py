@@ -39,6 +39,6 @@ class FineTuning:
     """The same of the audio features."""
     share: float = 1.0
     """Share of the trained weights in those of the new run; the rest are the weights that the training started from.
-    Below 1, the motion keeps more of their liveliness and of their agreement with the speech."""
+    Below 1, the motion keeps more of how those move and of their agreement with the speech."""
     keep_constant: bool = False
     """Whether values of poses that are constant in the run's corpus stay constant, for models that leave them out."""

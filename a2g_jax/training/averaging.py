@@ -1,7 +1,7 @@
 """Weights between those of a run and those that were trained from it (Wortsman et al., CVPR 2022, WiSE-FT).
 
-The weights of the run know how people move and listen, those that were trained on a minute of a person how this one
-does. A mean of both has more of either than the trained ones alone, which overfit.
+The weights of the run were trained on many people, those that were trained from it on a minute of one person, which
+they overfit. A mean of both lies between.
 """
 
 from collections.abc import Callable, Sequence

@@ -302,12 +302,12 @@ def test_from_the_command_line(take, speech, tmp_path, capsys):
     write_bvh(tmp_path / "wave.bvh", take.clip(100, 160))
     out, clip = tmp_path / "out", f"{tmp_path / 'wave.bvh'}@3"
     command = ["generate", "demo", "--audio", str(tmp_path / "speech.wav"), "--samples", "2", "--out", str(out)]
-    assert main([*command, "--pin", clip, "--control", "energy=0.9", "--temperature", "0.9"]) == 0
+    assert main([*command, "--pin", clip, "--control", "energy=0.9", "--edit", "specific scale 0:10 1.1"]) == 0
     assert capsys.readouterr().out.count("wrists 0.0 cm from the clip") == 2
     rows = json.loads((out / "pins.json").read_text())
     assert [[row["followed"] for row in sample] for sample in rows] == [[True], [True]]
     page = (out / "index.html").read_text()
-    assert "training steps, seed 0; energy=0.9; temperature 0.9; pinned wave.bvh at 3 s</p>" in page
+    assert "training steps, seed 0; energy=0.9; edit specific scale 0:10 1.1; pinned wave.bvh at 3 s</p>" in page
     assert main([*command, "--pin", clip, "--pin-shared", "1"]) == 2
     assert "--pin-shared is for --pin-mode latent" in capsys.readouterr().err
     assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@7"]) == 2

@@ -16,8 +16,8 @@ _TRAINING = {
 }
 
 #: The decoder learns how the person moves in the game with the discriminator. Since it overfits a minute of motion, its
-#: weights are averaged with those that it started from. Higher weights of the game calm the motion (4: hands stand
-#: still). The encoders stay, and so do the audio's z-scores.
+#: weights are averaged with those that it started from. Higher weights of the game calm the motion (4: hands
+#: nearly stand still). The encoders stay, and so do the audio's z-scores.
 _FINE_TUNING = FineTuning(
     TrainConfig(
         steps=300,
