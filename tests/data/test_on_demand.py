@@ -19,6 +19,8 @@ from a2g_jax.data.prepare import prepare_talker
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import WorkerDiedError
 from a2g_jax.errors import InputError, Interrupted
+from a2g_jax.io.files import sha256_file
+from a2g_jax.io.sealed import write_sealed
 from a2g_jax.talker import recordings
 from a2g_jax.training import loop
 from a2g_jax.training.loop import train
