@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from a2g_jax.data.batch import FIELDS, clip_shape
-from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus import Corpus, fingerprint_of
 from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.on_demand import OnDemand, PartStream, split_roles
 from a2g_jax.data.prepare import prepare_talker
 from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import WorkerDiedError
 from a2g_jax.errors import InputError, Interrupted
+from a2g_jax.io.files import sha256_file
+from a2g_jax.io.sealed import write_sealed
 from a2g_jax.talker import recordings
 from a2g_jax.training import loop
 from a2g_jax.training.loop import train
@@ -158,17 +160,29 @@ def test_stopping_while_a_part_is_waited_for(corpus):
         assert parts.get(1).arrays["pose"].shape == (300, 22, 6)
 
 
+def seal_parts(folder):
+    """Make the manifest agree with changed recipes."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["arrays"]["parts.json"] = sha256_file(folder / "parts.json")
+    manifest["fingerprint"] = fingerprint_of(manifest["arrays"])
+    write_sealed(folder / "manifest.json", manifest)
+
+
 def test_another_generator_is_refused(tmp_path, corpus):
     copy = shutil.copytree(corpus.path, tmp_path / "copy")
     held = json.loads((copy / "parts.json").read_text())
     held["stored"][0]["seed"] += 1
     (copy / "parts.json").write_text(json.dumps(held))
+    with pytest.raises(InputError, match=r"parts\.json: differs from its hash"):
+        Corpus.open(copy)
+    seal_parts(copy)
     with (
         pytest.raises(InputError, match="generates other recordings; prepare it anew"),
         PartStream(Corpus.open(copy), 1, 3),
     ):
         pass
     (copy / "parts.json").write_text('{"parts": []}')
+    seal_parts(copy)
     with pytest.raises(InputError, match=r"parts\.json: is damaged"):
         Corpus.open(copy)
     (copy / "parts.json").unlink()

@@ -169,7 +169,7 @@ def test_only_one_process_at_a_time(tmp_path, whole):
     path = tmp_path / "corpus"
 
     def meanwhile(done):
-        with pytest.raises(InputError, match="another process is preparing it"):
+        with pytest.raises(InputError, match=r"is being prepared by another process \(process [0-9]+ on "):
             prepare_corpus(path, ITEMS, make, PLAN)
         yield from make(done)
 

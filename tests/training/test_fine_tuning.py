@@ -28,6 +28,7 @@ from a2g_jax.training.fine_tuning import (
     without_frozen,
     without_measured,
 )
+from a2g_jax.training.folder import check_folder
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, load_run, open_run, save_run
 
@@ -260,7 +261,7 @@ def test_resuming_needs_only_the_run_itself(tmp_path, source, toy_corpus, monkey
 def test_the_path_of_a_source_is_no_setting(tmp_path, tuned):
     config, params = tuned(steps=1)
     save_run(tmp_path, Run(config, params, {}, 0))
-    check = lambda source: loop._check_folder(  # noqa: E731
+    check = lambda source: check_folder(  # noqa: E731
         tmp_path, dataclasses.replace(config, source=source), Checkpoints(tmp_path / "checkpoints", 1), True, False
     )
     check(dataclasses.replace(config.source, run="elsewhere"))
