@@ -80,5 +80,5 @@ def test_settings_of_a_fine_tuning_are_listed(capsys):
     assert main(["train", "audio2gestures", "--from", "demo", "--settings"]) == 0
     listed = capsys.readouterr().out
     assert "--patience 4" in listed
-    assert "--adversarial-weight 1.0" in listed
+    assert "--adversarial-weight 0.2" in listed
     assert "--decoder-channels 64,64,64,96,96" in listed

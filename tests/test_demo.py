@@ -90,7 +90,7 @@ def test_weights_without_properties_refuse_controls_and_name_the_remedy():
 @pytest.mark.parametrize("line", ["emotion=anger@60", "energy=0.2@0,0.9@1"])
 def test_requests_past_the_end_of_the_speech_are_refused(line, tmp_path, capsys):
     """Otherwise their values would hold from the start, or never arrive."""
-    run, second = demo_run(), np.ones(16000, np.float32)
+    run, second = demo_run(), np.random.default_rng(0).normal(0.0, 0.1, 16000).astype(np.float32)
     late = Generator(replace(run, config=run.config.with_sampling(controls=(line,))))
     for refuse in (late.check, lambda audio: late.generate(audio, 1), lambda _: control_rows(run, (line,), 30)):
         with pytest.raises(InputError, match="past the end of the speech, which lasts 1.00 s"):

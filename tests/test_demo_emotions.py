@@ -78,10 +78,10 @@ def test_emotions_differ_in_their_motion_and_are_those_of_generate(written):
     assert styles["anger"].speed > 1.3 * styles["sadness"].speed
     assert styles["anger"].height > styles["sadness"].height
     run = open_run("demo-emotion")
-    angry = Generator(replace(run, config=run.config.with_sampling(emotion="anger")))
-    alone = angry.generate(demo_recording()[0].audio, 1, seed=0)[0]
-    # Files hold what the check of the body left, which in a good motion is every joint.
-    assert np.median(np.abs(alone.positions() - motions["anger"].positions())) < 1e-4
+    surprised = Generator(replace(run, config=run.config.with_sampling(emotion="surprise")))
+    alone = surprised.generate(demo_recording()[0].audio, 1, seed=0)[0]
+    # Files hold what the check of the body left, which is every joint of a motion that is good at once, as this one.
+    assert np.median(np.abs(alone.positions() - motions["surprise"].positions())) < 1e-4
 
 
 def test_speech_of_ones_own_has_no_talker(monkeypatch, tmp_path, speech, capsys):

@@ -7,14 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus import Corpus, fingerprint_of
 from a2g_jax.data.corpus_layout import MANIFEST
 from a2g_jax.data.corpus_writer import prepare_recording, write_corpus, write_statistics
 from a2g_jax.data.folder import read_pair
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.io.files import read_json, write_json
+from a2g_jax.io.files import read_json, sha256_file
+from a2g_jax.io.sealed import write_sealed
 from a2g_jax.recording import Recording
 from a2g_jax.training.run import RunConfig
 from experiments.motion.speeches import SAMPLE_RATE, Speech
@@ -115,8 +116,17 @@ def _corpus(folder: Path, pieces: Sequence[Recording], config: RunConfig) -> Cor
         corpus = write_corpus(folder, prepared, features=features, recipe={"reader": "folder"})
         splits = {"train": [Segment(index, 0, entry.frames) for index, entry in enumerate(corpus.recordings)]}
         write_statistics(folder, corpus.recordings, splits)
-        write_json(folder / MANIFEST, {**read_json(folder / MANIFEST), "splits": splits})
+        _write_splits(folder, splits)
     return Corpus.open(folder)
+
+
+def _write_splits(folder: Path, splits: dict[str, list[Segment]]) -> None:
+    """Write other splits, and the hashes that changed with the statistics of their training part."""
+    manifest = read_json(folder / MANIFEST)
+    hashes = manifest["arrays"] | {"statistics.npz": sha256_file(folder / "statistics.npz")}
+    write_sealed(
+        folder / MANIFEST, manifest | {"splits": splits, "arrays": hashes, "fingerprint": fingerprint_of(hashes)}
+    )
 
 
 def _speech(name: str, piece: Recording, corpus: Corpus, index: int) -> Speech:

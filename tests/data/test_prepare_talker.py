@@ -63,7 +63,7 @@ def test_the_corpus_of_emotion_gesture_with_and_without_jitter(tmp_path, short):
     for name in ("audio", "waveform", "words", "word_starts", "emotion"):
         np.testing.assert_array_equal(clean.array(name), noisy.array(name))
     assert clean.array("words")[clean.array("word_starts")].all()
-    turned = rotations_from_rows(noisy.pose, "6d") @ np.swapaxes(rotations_from_rows(clean.pose, "6d"), -1, -2)
+    turned = rotations_from_rows(noisy.pose[:], "6d") @ np.swapaxes(rotations_from_rows(clean.pose[:], "6d"), -1, -2)
     degrees = np.degrees(np.arccos(np.clip((np.trace(turned, axis1=-2, axis2=-1) - 1) / 2, -1, 1)))
     assert 0.3 < np.median(degrees) < 3.0
 

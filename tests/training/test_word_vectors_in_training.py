@@ -27,7 +27,7 @@ def test_trained_word_vectors_of_a_source_stay(tmp_path, toy_corpus, toy_run_con
         return training_model(config)._replace(use_words=fill)
 
     monkeypatch.setattr(loop, "training_model", reading_model)
-    monkeypatch.setattr(loop, "make_folder", begin)
+    monkeypatch.setattr(loop, "write_description", begin)
     config = toy_run_config()
     start = loop.init_state(training_model(config), (), 0).params if tuned else None
     with pytest.raises(expected):
