@@ -83,7 +83,7 @@ def commands(inputs: Inputs) -> tuple[Command, ...]:
             "out",
         ),
         Command("evaluate", ("evaluate", "--corpus", corpus, "--samples", "1"), "report"),
-        Command("retarget", ("retarget", str(inputs.folder / "take.bvh"), "--to", "upper-body"), "moved.bvh"),
+        Command("retarget", ("retarget", str(inputs.folder / "take.bvh"), "--to", "body"), "moved.bvh"),
     )
 
 
