@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 #: Length of a block, seconds.
 _BLOCK = 0.025
-#: Number of blocks below which an offset cannot be told from the signal.
+#: Number of blocks below which an offset cannot be distinguished from the signal.
 _FEWEST = 20
 #: An offset is removed unless it is this many decibels below the level of speech. Smaller ones change motion by
 #: 0.11 degrees at most (``demo`` and ``demo-flow``, three speeches), and ordinary recordings, most of whose offsets

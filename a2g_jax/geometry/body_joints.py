@@ -42,3 +42,13 @@ def _is_body_tree(skeleton: Skeleton, joints: tuple[int, ...]) -> bool:
         return False
     links = [(joint, joints[parent]) for joint, parent in zip(joints, BODY_PARENTS, strict=True) if parent >= 0]
     return all(path_up(skeleton.parents, joint, parent) is not None for joint, parent in links)
+
+
+def common_ancestor(parents: tuple[int, ...], first: int, second: int) -> int:
+    """Lowest common ancestor of two joints, which may be one of them."""
+    while first != second:
+        if first > second:
+            first = parents[first]
+        else:
+            second = parents[second]
+    return first

@@ -1,4 +1,4 @@
-"""Identity of processes, so that files of killed ones can be told from those of living ones."""
+"""Identity of processes, to distinguish files of killed ones from those of running ones."""
 
 import hashlib
 import os

@@ -103,7 +103,7 @@ def emotion_on_request() -> list[str]:
 
 
 def told_from_neutral() -> list[str]:
-    """Each emotion is told apart from neutral more often than not."""
+    """Each emotion is classified as more probable than neutral in more than half of the clips."""
     table, lines = table3.TABLE.name, []
     for name in (table3.OURS, table3.OURS_LABEL, TRUTH):
         for emotion in EMOTIONS:

@@ -15,12 +15,12 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.training.run import Run
 from experiments.emotion_gesture.bench import FIRST, TRUTH, Bench, Made
-from experiments.emotion_gesture.page import render
+from experiments.emotion_gesture.page import show
 from experiments.emotion_gesture.scores import cell, scores_of
 from experiments.emotion_gesture.settings import TINY, ours, paper, scaled
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.claims import Claim
-from experiments.tables.records import append, current, path_of, records
+from experiments.tables.records import append, records
 from experiments.tables.runs import Ruler, Setting, measure, run_table
 
 WITHOUT, WITH, STRONG = "without L_smooth", "with L_smooth", "with ten times L_smooth"
@@ -63,12 +63,7 @@ def main() -> None:
         if options.clean is None:
             raise InputError("--corpus: is scored against clean motion; give its corpus with --clean.")
         compute(setting_of(options), Corpus.open(options.clean), options.only.split(",") if options.only else None)
-    if not current(TABLE.name):
-        print(f"{TABLE.name}: there are no records yet; give a corpus with --corpus.")
-        return
-    text = render(TABLE)
-    path_of(TABLE.name, ".md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    show(TABLE)
 
 
 def compute(where: Setting, clean: Corpus, only: list[str] | None) -> None:

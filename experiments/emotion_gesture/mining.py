@@ -19,12 +19,12 @@ from a2g_jax.data.batches import BatchMaker, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.models.emotion_gesture.networks import Networks
 from a2g_jax.training.run import Run
-from experiments.emotion_gesture.page import render
+from experiments.emotion_gesture.page import show
 from experiments.emotion_gesture.scores import cell
 from experiments.emotion_gesture.settings import FULL, TINY, ours, paper, scaled
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.claims import Claim
-from experiments.tables.records import append, current, path_of, records
+from experiments.tables.records import append, records
 from experiments.tables.runs import Ruler, Setting, described, measure, run_table
 
 #: Clips of one call; training recordings that probes are fitted to; frames of them for onsets; steps of the solver.
@@ -187,12 +187,7 @@ def main() -> None:
         untrained(where)
         only = options.only.split(",") if options.only else None
         run_table(TABLE.name, scaled(VARIANTS, where.steps), where, only, mined, "probes")
-    if not current(TABLE.name):
-        print(f"{TABLE.name}: there are no records yet; give a corpus with --corpus.")
-        return
-    text = render(TABLE)
-    path_of(TABLE.name, ".md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    show(TABLE)
 
 
 if __name__ == "__main__":

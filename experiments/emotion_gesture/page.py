@@ -9,7 +9,7 @@ from a2g_jax.evaluation.scores import Metric
 from experiments.emotion_gesture.bench import NULLS
 from experiments.emotion_gesture.table import Table
 from experiments.tables.claims import judge, over_seeds
-from experiments.tables.records import current
+from experiments.tables.records import current, path_of
 
 ARROWS = {"lower": "↓", "higher": "↑", "truth": "≈"}
 
@@ -45,6 +45,16 @@ METRICS: dict[str, Metric] = {
     "accuracy": _percent("accuracy"),
     "balanced": _percent("mean over emotions"),
 }
+
+
+def show(table: Table) -> None:
+    """Render the records of a table, if there are any, to its page and to the terminal."""
+    if not current(table.name):
+        print(f"{table.name}: there are no records yet; give a corpus with --corpus.")
+        return
+    text = render(table)
+    path_of(table.name, ".md").write_text(text + "\n", encoding="utf-8")
+    print(text)
 
 
 def render(table: Table) -> str:

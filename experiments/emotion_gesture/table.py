@@ -13,7 +13,7 @@ from experiments.emotion_gesture.requests import requested, takes_requests, true
 from experiments.emotion_gesture.scores import scores_of
 from experiments.emotion_gesture.settings import scaled
 from experiments.tables.claims import Claim
-from experiments.tables.records import append, current, path_of, records
+from experiments.tables.records import append, records
 from experiments.tables.runs import Ruler, Setting, Variant, arguments, measure, run_table, setting
 
 #: Name of :func:`continued` in records.
@@ -44,18 +44,13 @@ class Table:
 
 def command(table: Table) -> None:
     """Parse the flags, compute what is missing, and write the page."""
-    from experiments.emotion_gesture.page import render
+    from experiments.emotion_gesture.page import show  # which has tables as its argument
 
     options = parser(table.title).parse_args()
     if options.corpus is not None:
         where = setting_of(options)
         compute(table, where, options.only.split(",") if options.only else None)
-    if not current(table.name):
-        print(f"{table.name}: there are no records yet; give a corpus with --corpus.")
-        return
-    text = render(table)
-    path_of(table.name, ".md").write_text(text + "\n", encoding="utf-8")
-    print(text)
+    show(table)
 
 
 def parser(title: str) -> argparse.ArgumentParser:

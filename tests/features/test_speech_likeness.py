@@ -1,4 +1,4 @@
-"""Speech is told from noise, tones, signals, music and drums."""
+"""Speech is distinguished from noise, tones, signals, music and drums."""
 
 import numpy as np
 import pytest

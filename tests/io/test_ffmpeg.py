@@ -26,7 +26,7 @@ HEADS = {
     "phone memo.wav": M4A,
     "download": M4A,
 }
-#: A program in place of ffmpeg: writes a file given by the test, says what it is told to say.
+#: A program in place of ffmpeg: writes the output and the messages that a test sets.
 PROGRAM = """#!{python}
 import sys, time
 from pathlib import Path

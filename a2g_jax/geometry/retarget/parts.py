@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import path_up
+from a2g_jax.geometry.body_joints import common_ancestor, path_up
 from a2g_jax.geometry.joint_names import named_joints, parse_name
 from a2g_jax.geometry.retarget.rest import trunk_axis
 from a2g_jax.geometry.retarget.topology import joints_by_shape
@@ -90,10 +90,10 @@ def _swapped(roles: dict[str, int], parts: tuple[str, ...]) -> dict[str, int]:
 def _complete(skeleton: Skeleton, roles: dict[str, int]) -> None:
     """Add parts that follow from others: the chest, the pelvis, collars without a usual name."""
     parents = skeleton.parents
-    roles["Chest"] = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
+    roles["Chest"] = common_ancestor(parents, roles["L_Shoulder"], roles["R_Shoulder"])
     if "L_Hip" in roles and "R_Hip" in roles:
-        fork = _common(parents, roles["L_Hip"], roles["R_Hip"])
-        low = _common(parents, fork, roles["Chest"])
+        fork = common_ancestor(parents, roles["L_Hip"], roles["R_Hip"])
+        low = common_ancestor(parents, fork, roles["Chest"])
         pelvis = roles.get("Pelvis")
         if pelvis is None or any(path_up(parents, roles[part], pelvis) is None for part in ("Chest", "L_Hip", "R_Hip")):
             roles["Pelvis"] = low
@@ -174,13 +174,3 @@ def assign_sides(
         if left @ (places[roles[f"L_{parts[0]}"]] - places[roles[f"R_{parts[0]}"]]) < 0:
             roles = _swapped(roles, parts)
     return roles
-
-
-def _common(parents: tuple[int, ...], first: int, second: int) -> int:
-    """Lowest common ancestor of two joints, which may be one of them."""
-    while first != second:
-        if first > second:
-            first = parents[first]
-        else:
-            second = parents[second]
-    return first

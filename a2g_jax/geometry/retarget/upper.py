@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from a2g_jax.geometry.body_joints import common_ancestor
 from a2g_jax.geometry.joint_names import parse_name
 from a2g_jax.geometry.skeleton import Skeleton
 
@@ -20,7 +21,7 @@ def neck_and_head(skeleton: Skeleton, roles: Mapping[str, int]) -> dict[str, int
     if "Head" in roles or "Neck" in roles:
         return {}
     parents, parsed = skeleton.parents, [parse_name(name) for name in skeleton.names]
-    chest = _common(parents, roles["L_Shoulder"], roles["R_Shoulder"])
+    chest = common_ancestor(parents, roles["L_Shoulder"], roles["R_Shoulder"])
     arms = {_child(parents, roles[f"{side}_Shoulder"], chest) for side in "LR"}
     stem = _stem(parsed[chest].base)
 
@@ -58,12 +59,3 @@ def _child(parents: tuple[int, ...], joint: int, above: int) -> int:
     while joint >= 0 and parents[joint] != above:
         joint = parents[joint]
     return joint
-
-
-def _common(parents: tuple[int, ...], first: int, second: int) -> int:
-    while first != second:
-        if first > second:
-            first = parents[first]
-        else:
-            second = parents[second]
-    return first
