@@ -119,6 +119,24 @@ def test_playing_follows_the_audio_and_stops_at_its_end(browser, page_file):
         assert page.evaluate("a2gPlayer.frame(0)") == 119
 
 
+def test_long_speech_is_in_its_place(browser, tmp_path):
+    """MP3 delays speech by a part of a frame, which the page takes back."""
+    audio = tone(62.0) * 0.05
+    for second in (0.5, 30.25, 61.5):
+        audio[round(16000 * second)] = 1.0
+    write_page(tmp_path / "page.html", [Figure(waving(60), "One")], audio, 16000, title="long")
+    with opened(browser, tmp_path / "page.html") as page:
+        found = page.evaluate(
+            "() => { const { samples, rate } = a2gPlayer.speech(); const peak = (from, to) => { let at = from;"
+            " for (let i = from; i < to; i++) if (samples[i] > samples[at]) at = i; return at / rate; };"
+            " return [samples.length, peak(0, 16000), peak(480000, 490000), peak(976000, samples.length)]; }"
+        )
+        assert found[0] == len(audio)
+        np.testing.assert_allclose(found[1:], [0.5, 30.25, 61.5], atol=2e-3)
+        wait_until(page, "Number.isFinite(document.getElementById('audio').duration)")
+        assert page.evaluate("document.getElementById('audio').duration") == pytest.approx(62.0, abs=1e-3)
+
+
 def test_keys_step_solo_and_play(browser, page_file):
     with opened(browser, page_file, width=300, height=400) as page:
         page.keyboard.press("ArrowRight")

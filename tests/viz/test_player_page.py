@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import soundfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from a2g_jax.errors import InputError
 from a2g_jax.recording import Word
+from a2g_jax.talker.recordings import talk
 from a2g_jax.viz.player import Figure, Track, show_page, write_page
 from a2g_jax.viz.player.encode import decode_positions, encode_positions
 from a2g_jax.viz.player.page import fill_template, script_json
@@ -67,7 +69,7 @@ def test_quantisation_error_is_below_half_a_millimetre(seed, reach, shift):
 def test_audio_is_the_same_to_16_bits(tmp_path):
     audio = np.concatenate([tone(0.5), np.float32([1.0, -1.0, 1.5, -2.0, 0.0])])
     data = page_data(write(tmp_path, audio=audio))
-    with wave.open(io.BytesIO(base64.b64decode(data["audio"]))) as sound:
+    with wave.open(io.BytesIO(base64.b64decode(data["audio"]["data"]))) as sound:
         assert (sound.getframerate(), sound.getnchannels(), sound.getsampwidth()) == (16000, 1, 2)
         samples = np.frombuffer(sound.readframes(sound.getnframes()), "<i2")
     np.testing.assert_array_equal(samples, np.round(np.clip(audio, -1, 1) * 32767))
@@ -76,7 +78,7 @@ def test_audio_is_the_same_to_16_bits(tmp_path):
 
 def test_without_audio_the_longest_motion_sets_the_length(tmp_path):
     data = page_data(write(tmp_path, audio=np.zeros(0, np.float32)))
-    assert data["audio"] == ""
+    assert data["audio"]["data"] == ""
     assert data["duration"] == pytest.approx(2.0)
 
 
@@ -110,9 +112,27 @@ def test_template_values_are_not_filled_again():
     assert fill_template("{{a}} {{b}}", {"a": "{{b}}", "b": "2"}) == "{{b}} 2"
 
 
-def test_five_minutes_of_samples_stay_small(tmp_path):
-    write(tmp_path, figures=[Figure(waving(1800), str(k)) for k in range(5)], audio=tone(60.0))
-    assert (tmp_path / "page.html").stat().st_size < 5.2e6
+def test_minutes_of_talk_stay_small(tmp_path):
+    """At this rate, ten minutes with five samples are below 12 MB."""
+    recording = talk(65.0, 3, fps=30.0)
+    write(tmp_path, figures=[Figure(recording.motion, "talk")], audio=recording.audio)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    write(empty, figures=[Figure(recording.motion.clip(0, 1), "talk")], audio=recording.audio[:160])
+    motion = len(page_data((tmp_path / "page.html").read_text())["figures"][0]["data"])
+    sound = len(page_data((tmp_path / "page.html").read_text())["audio"]["data"])
+    page = (empty / "page.html").stat().st_size
+    assert page + 600 / 65 * (5 * motion + sound) < 12e6
+
+
+def test_long_speech_is_compressed(tmp_path):
+    audio = tone(61.0)
+    data = page_data(write(tmp_path, audio=audio))["audio"]
+    assert (data["type"], data["samples"], data["rate"]) == ("audio/mpeg", len(audio), 16000)
+    decoded, rate = soundfile.read(io.BytesIO(base64.b64decode(data["data"])), dtype="float32")
+    assert rate == 16000
+    assert abs(len(decoded) - len(audio)) < 2400
+    assert len(data["data"]) < 61 * 16000
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
-"""Motion and audio as 16-bit numbers in base64, for a page without other files."""
+"""Motion as compressed whole numbers in base64, for a page without other files."""
 
 import base64
-import struct
+import zlib
 
 import numpy as np
 from jaxtyping import Float
@@ -9,16 +9,21 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 
 _FULL = 65535
-_FINEST = 1e-5
+#: Smallest step, metres: a fifth of a pixel at most, where a figure has 1000 pixels.
+_FINEST = 2e-4
+_MODULUS = 65536
 
 
 def encode_positions(points: Float[np.ndarray, "T P 3"], label: str) -> dict:
-    """Quantise positions to 16 bits over the range of each axis.
+    """Quantise positions to 16 bits over the range of each axis, and compress them.
+
+    Of each coordinate over time, the second differences are kept: a motion is smooth, and they are small. They are
+    modulo 65536 and alternate in sign (0, -1, 1, -2, ...), coordinate after coordinate, first all low bytes and then
+    all high ones, in the format of zlib, which browsers can read.
 
     Returns:
-        ``low`` and ``step`` (one number per axis, metres) and ``data``: base64 of little-endian unsigned 16-bit numbers
-        ``q`` in the order of ``points``, with ``position = low + step * q``. The error is half a step: 0.03 mm for a
-        speaker on a spot of 4 m, and never more than 0.5 mm.
+        ``low`` and ``step`` (one number per axis, metres) and ``data``, base64, with ``position = low + step * q``. The
+        error is half a step: 0.1 mm for a speaker on a spot of 13 m, and never more than 0.5 mm.
     """
     if points.shape[0] == 0:
         raise InputError(f"figure {label!r}: the motion has no frames; give it at least one.")
@@ -33,25 +38,20 @@ def encode_positions(points: Float[np.ndarray, "T P 3"], label: str) -> dict:
             f"figure {label!r}: positions span {float((high - low).max()):.0f} m; the page holds 65 m; check that the"
             " motion is in metres."
         )
-    numbers = np.round((flat - low) / step).clip(0, _FULL).astype("<u2")
-    return {"low": low.tolist(), "step": step.tolist(), "data": base64.b64encode(numbers.tobytes()).decode("ascii")}
+    numbers = np.round((flat - low) / step).clip(0, _FULL).astype(np.int64).reshape(len(points), -1).T
+    change = np.diff(numbers, n=2, axis=1, prepend=np.zeros((len(numbers), 2), np.int64))
+    change = (change + _MODULUS // 2) % _MODULUS - _MODULUS // 2
+    codes = ((change << 1) ^ (change >> 63)).astype("<u2")
+    parts = (codes & 255).astype(np.uint8).tobytes() + (codes >> 8).astype(np.uint8).tobytes()
+    data = base64.b64encode(zlib.compress(parts, 9)).decode("ascii")
+    return {"low": low.tolist(), "step": step.tolist(), "data": data}
 
 
 def decode_positions(encoded: dict, points: int) -> Float[np.ndarray, "T P 3"]:
     """Positions in metres from what :func:`encode_positions` returned."""
-    numbers = np.frombuffer(base64.b64decode(encoded["data"]), "<u2").reshape(-1, points, 3)
-    return np.asarray(encoded["low"]) + np.asarray(encoded["step"]) * numbers
-
-
-def encode_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> str:
-    """A mono 16-bit PCM WAV file in base64; samples beyond -1 to 1 are clipped."""
-    if sample_rate <= 0:
-        raise InputError(f"audio: the sample rate is {sample_rate}; give samples per second.")
-    if not np.isfinite(audio).all():
-        sample = int(np.argwhere(~np.isfinite(audio))[0, 0])
-        raise InputError(f"audio, sample {sample}: not a finite number; fix the audio first.")
-    samples = np.round(np.clip(audio, -1.0, 1.0) * 32767.0).astype("<i2").tobytes()
-    form = struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, sample_rate, 2 * sample_rate, 2, 16)
-    data = struct.pack("<4sI", b"data", len(samples)) + samples
-    riff = struct.pack("<4sI4s", b"RIFF", 4 + len(form) + len(data), b"WAVE")
-    return base64.b64encode(riff + form + data).decode("ascii")
+    parts = np.frombuffer(zlib.decompress(base64.b64decode(encoded["data"])), np.uint8).astype(np.int64)
+    low, high = parts.reshape(2, 3 * points, -1)
+    codes = low + 256 * high
+    change = (codes >> 1) ^ -(codes & 1)
+    numbers = np.cumsum(np.cumsum(change, axis=1), axis=1) % _MODULUS
+    return np.asarray(encoded["low"]) + np.asarray(encoded["step"]) * numbers.T.reshape(-1, points, 3)

@@ -13,14 +13,16 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
 from a2g_jax.io.words import Word
-from a2g_jax.viz.player.encode import encode_audio, encode_positions
+from a2g_jax.viz.player.encode import encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.sound import encode_audio
 from a2g_jax.viz.player.stage import placement, shape_points
 
 #: Parts of the script, in their order in the page.
 _SCRIPTS = (
     "math",
+    "unpack",
     "figures",
     "shaders",
     "webgl",
@@ -92,7 +94,7 @@ def page_html(
     if not figures:
         raise InputError("the page has no figures; give at least one.")
     data = {
-        "audio": encode_audio(audio, sample_rate) if audio.size else "",
+        "audio": encode_audio(audio, sample_rate),
         "duration": audio.size / sample_rate if audio.size else max(figure.motion.seconds for figure in figures),
         "words": [[word.text, word.start, word.end] for word in words],
         "lanes": [lane.encoded() for lane in lanes],

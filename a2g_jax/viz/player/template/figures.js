@@ -1,25 +1,13 @@
-// Motion data: decoding, the pose at a moment, and the capsules to draw for it.
+// Motion data: the pose at a moment, and the capsules to draw for it.
 
 const STRIDE = 16; // numbers of one capsule: start, radius; end, radius; axis, flatness; colour, gloss
 
-function bytesOf(text) {
-  const raw = atob(text), bytes = new Uint8Array(raw.length);
-  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
-  return bytes;
-}
-
-function decodePositions(figure) {
-  const view = new DataView(bytesOf(figure.data).buffer), count = view.byteLength / 2, out = new Float32Array(count);
-  for (let i = 0; i < count; i++) out[i] = figure.low[i % 3] + figure.step[i % 3] * view.getUint16(2 * i, true);
-  return out;
-}
-
 class Figure {
-  constructor(data, index) {
+  constructor(data, positions, index) {
     Object.assign(this, data);
     this.index = index;
     this.colour = PALETTE[index % PALETTE.length];
-    this.positions = decodePositions(data);
+    this.positions = positions;
     this.data = null;
     this.pose = new Float32Array(3 * this.points);
     this.axesNow = this.axes.map(() => new Float32Array(12));

@@ -1,11 +1,12 @@
 // The player: one clock (the audio), one camera, all figures.
 
 class Player {
-  constructor(data) {
+  constructor(data, positions, speech) {
     this.element = (id) => document.getElementById(id);
-    this.figures = data.figures.map((figure, index) => new Figure(figure, index));
+    this.figures = data.figures.map((figure, index) => new Figure(figure, positions[index], index));
     this.words = data.words;
     this.lanes = data.lanes;
+    this.speech = speech;
     this.duration = Math.max(data.duration, 1e-3);
     this.fastest = Math.max(0.5, ...this.figures.map((figure) => figure.speeds.reduce((a, b) => Math.max(a, b), 0)));
     this.camera = { ...START };
@@ -17,7 +18,7 @@ class Player {
     this.scheme = matchMedia("(prefers-color-scheme: dark)");
     this.renderer = this.makeRenderer();
     this.timeline = new Timeline(this);
-    this.audio = this.loadAudio(data.audio);
+    this.audio = this.loadAudio(speech);
     this.makeLabels();
     fillLegend(this);
     this.makeControls();
@@ -46,12 +47,11 @@ class Player {
     return made || new CanvasRenderer(canvas);
   }
 
-  loadAudio(text) {
+  loadAudio(speech) {
     const audio = this.element("audio");
-    if (!text) return null;
-    const bytes = bytesOf(text), view = new DataView(bytes.buffer);
-    this.timeline.load(new Int16Array(bytes.buffer, 44, (bytes.length - 44) >> 1), view.getUint32(24, true));
-    audio.src = URL.createObjectURL(new Blob([bytes], { type: "audio/wav" }));
+    if (!speech) return null;
+    this.timeline.load(speech.samples, speech.rate);
+    audio.src = URL.createObjectURL(new Blob([speech.wav], { type: "audio/wav" }));
     audio.addEventListener("ended", () => this.ended());
     return audio;
   }
@@ -296,11 +296,25 @@ class Player {
   }
 }
 
-const player = new Player(JSON.parse(document.getElementById("data").textContent));
+async function open(data) {
+  const unpacked = Promise.all(data.figures.map(unpackPositions));
+  const speech = await unpackSpeech(data.audio).catch((error) => {
+    console.warn("This browser cannot decode the speech; the figures move without it:", error.message);
+    return null;
+  });
+  return new Player(data, await unpacked, speech);
+}
+
+let player = null;
+const opening = open(JSON.parse(document.getElementById("data").textContent)).then((made) => { player = made; return made.ready; });
+opening.catch((error) => {
+  document.getElementById("labels").textContent = `This browser is too old for the page (${error.message}).`;
+});
+// For tests and pictures; everything but `ready` is there once that has resolved.
 window.a2gPlayer = {
-  ready: player.ready,
-  renderer: player.renderer.name,
-  figures: player.figures.map(({ label, note, fps, frames, points }) => ({ label, note, fps, frames, points })),
+  ready: opening,
+  get renderer() { return player.renderer.name; },
+  get figures() { return player.figures.map(({ label, note, fps, frames, points }) => ({ label, note, fps, frames, points })); },
   play: () => player.play(),
   pause: () => player.pause(),
   seek: (time) => player.seek(time),
@@ -309,6 +323,7 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
+  speech: () => player.speech,
   // The tooltip of a position in the detailed timeline, in CSS pixels from its corner; lanes from top to bottom.
   tell: (x, y) => player.timeline.tell(x, y) || null,
   lanes: () => player.timeline.rows().map(({ kind, height, lane, figure }) => ({ kind, height, name: lane ? lane.name : kind, figure: figure ? figure.label : null })),
