@@ -8,7 +8,7 @@ from typing import Any
 from a2g_jax.cli import sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
-from a2g_jax.cli.speech import read_speech
+from a2g_jax.cli.speech import read_speech, read_words
 from a2g_jax.errors import InputError
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
@@ -60,6 +60,9 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         InputError: audio, a run or a folder that cannot be used, or flags that exclude each other.
     """
     existing_file(options.audio)
+    existing_file(options.transcript)
+    if options.transcript is not None and options.audio is None:
+        raise InputError("--transcript: belongs to a speech; name it with --audio.")
     chosen = [flag for flag, on in _modes(options).items() if on]
     if len(chosen) > 1:
         raise InputError(
@@ -99,7 +102,9 @@ def _demo(options: argparse.Namespace) -> None:
     # Bad audio is refused before minutes of training.
     words: Any = ()
     if options.audio is not None:
-        audio, title = read_speech(options.audio, options.channel).at(MelConfig().sample_rate), Path(options.audio).name
+        rate = MelConfig().sample_rate
+        audio, title = read_speech(options.audio, options.channel).at(rate), Path(options.audio).name
+        words = read_words(options.transcript, options.tier, len(audio) / rate)
     else:
         speech = demo_speech()
         audio, title, words = speech.audio, "the speech of the demo", speech.words
@@ -139,7 +144,9 @@ def _side_by_side(options: argparse.Namespace, runs: dict[str, Any], kind: str) 
     keep_compilations()
     speech = demo_speech_with_truth()
     if options.audio is not None:
-        speech = Speech(Path(options.audio).name, read_speech(options.audio, options.channel).at)
+        sound = read_speech(options.audio, options.channel)
+        words = read_words(options.transcript, options.tier, sound.seconds)
+        speech = Speech(Path(options.audio).name, sound.at, words)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
         compared = compare(
             runs,

@@ -7,7 +7,7 @@ from pathlib import Path
 from a2g_jax.cli import clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
-from a2g_jax.cli.speech import read_speech
+from a2g_jax.cli.speech import read_speech, read_words
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
 
@@ -56,6 +56,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
             raise InputError(f"--{name} is needed (see 'a2g generate --help').")
     clips.check_flags(options, extra)
     existing_file(options.audio)
+    existing_file(options.transcript)
     clips.check_files(options)
     writable_folder(options.out)
 
@@ -66,10 +67,12 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     opened = open_run(options.run)
     trained = replace(opened, config=replace(opened.config, sampling=settings))
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
-    audio = read_speech(options.audio, options.channel).at(trained.config.mel.sample_rate)
+    rate = trained.config.mel.sample_rate
+    audio = read_speech(options.audio, options.channel).at(rate)
+    words = read_words(options.transcript, options.tier, len(audio) / rate)
     chosen = clips.sampler_of(trained, audio, options)
     parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))
-    about = {**chosen.about, "label": ", ".join(part for part in parts if part)}
+    about = {**chosen.about, "label": ", ".join(part for part in parts if part), "words": words}
     sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **about)
     for line in chosen.report(Path(options.out)):
         print(line)

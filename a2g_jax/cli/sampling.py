@@ -5,7 +5,7 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from a2g_jax.cli.argument_types import count, formats, seed
+from a2g_jax.cli.argument_types import TIER, count, formats, seed
 from a2g_jax.config import check_needs, from_json, parse_flags
 from a2g_jax.generation.formats import PAGE, format_names
 from a2g_jax.models.registry import find_trained_model
@@ -45,6 +45,12 @@ def add_arguments(
         default=",".join(known),
         help=f"any of {', '.join(known)}, comma-separated (default: all)",
     )
+    parser.add_argument(
+        "--transcript",
+        metavar="FILE",
+        help="words of the speech with their times, for the page: TextGrid, JSON of Google's speech-to-text, or TSV",
+    )
+    parser.add_argument("--tier", metavar="NAME", help=TIER)
     parser.add_argument(
         "--strict",
         action="store_true",

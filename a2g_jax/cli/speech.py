@@ -1,9 +1,10 @@
-"""Speech named on the command line, with warnings of what is wrong with it."""
+"""Speech and its transcript named on the command line, with warnings of what is wrong with them."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from a2g_jax.io.audio import Sound
+    from a2g_jax.io.words import Word
 
 
 def read_speech(path: str, channel: int | None) -> "Sound":
@@ -23,3 +24,31 @@ def read_speech(path: str, channel: int | None) -> "Sound":
     for finding in speech_warnings(sound):
         say(f"warning: {path}: {finding.message} {finding.fix}".rstrip())
     return sound
+
+
+def read_words(path: str | None, tier: str | None, seconds: float) -> "tuple[Word, ...]":
+    """The words of a transcript for the page; prints a line for each remark on it. None without a file.
+
+    Args:
+        seconds: of the speech.
+
+    Raises:
+        InputError: not a transcript, or one whose words all start after the end of the speech.
+    """
+    if path is None:
+        return ()
+
+    from a2g_jax.errors import InputError
+    from a2g_jax.io.transcripts import transcript_notes
+    from a2g_jax.progress import say
+
+    words, notes = transcript_notes(path, tier)
+    for note in notes:
+        say(f"warning: {path}: {note}")
+    spoken = tuple(word for word in words if word.start < seconds)
+    if words and not spoken:
+        raise InputError(
+            f"{path}: all words start after the end of the speech, which lasts {seconds:.2f} s; are the times in"
+            " seconds, and is it the transcript of this recording?"
+        )
+    return spoken

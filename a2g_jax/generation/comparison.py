@@ -165,12 +165,13 @@ def compare(
     with MotionFiles(out, stems, formats, REPORTS) as files:
         for name, made in motions.items():
             for number, motion in enumerate(made):
-                files.write(number, motion, name)
+                names = files.write(number, motion, name)
                 label = f"{name} {number}" if samples > 1 else name
                 findings = checked[name].reports[number].findings
-                figures.append(checked_figure(motion, label, findings, _note(runs[name], without.get(name, ()))))
+                note = _note(runs[name], without.get(name, ()))
+                figures.append(checked_figure(motion, label, findings, note, names))
         if speech.truth is not None:
-            files.write(0, speech.truth.motion, TALKER)
+            figures[0] = replace(speech.truth, files=files.write(0, speech.truth.motion, TALKER))
         systems = {name: one.to_json() for name, one in checked.items()}
         write_json(files.folder / CHECKS, {"format": _FORMAT, "systems": systems})
         if PAGE in formats:

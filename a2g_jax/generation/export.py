@@ -42,8 +42,7 @@ def export(
         audio: (N,), mono.
         formats: names of :func:`~a2g_jax.generation.formats.motion_formats`, and ``html``.
         title: name of the speech, for the page's heading.
-        label: what the motions were made with, for the page's subtitle, which also names the run, requested controls
-            and pinned clips.
+        label: what was requested besides controls, for the page's subtitle; its footer names the run and the seed.
         lanes: further tracks of the page's timeline.
         report: called with the number of samples done: with ``strict`` once they are checked, else once written.
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
@@ -56,9 +55,9 @@ def export(
             refused. Without ``strict``, those before it stay in the folder, and ``checks.json`` has the findings.
         OutputError: the disk is full, or the folder cannot be written to; files of an earlier call stay.
     """
-    audio = speech_at_rate(run, audio, sample_rate)
+    audio, config = speech_at_rate(run, audio, sample_rate), run.config
     if PAGE in formats:
-        check_page_size(samples, audio_frames(run, audio), run.config.skeleton.joints)
+        check_page_size(samples, audio_frames(run, audio), config.skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
     check_folder_writable(out)  # before any work
@@ -69,9 +68,10 @@ def export(
         done = 0
         try:
             for done, motion in enumerate(motions, start=1):
-                files.write(done - 1, motion)
+                names = files.write(done - 1, motion)
                 if PAGE in formats:
-                    figures.append(checked_figure(motion, f"sample {done - 1}", checked.reports[done - 1].findings))
+                    findings = checked.reports[done - 1].findings
+                    figures.append(checked_figure(motion, f"sample {done - 1}", findings, files=names))
                 if not checked.strict:
                     report(done)
         finally:
@@ -82,22 +82,21 @@ def export(
                 files.folder / "index.html",
                 figures,
                 audio,
-                run.config.mel.sample_rate,
+                config.mel.sample_rate,
                 title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-                subtitle=_caption(checked, seed, label),
+                subtitle=_requested(checked, samples, label),
                 words=words,
                 lanes=lanes,
+                footer=f"{config.model}, {config.preset} preset, {run.steps} training steps, seed {seed}",
             )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def _caption(checked: Checked, seed: int, label: str) -> str:
-    """What the motions were made with."""
-    config = checked.run.config
-    parts = [f"{config.model}, {config.preset} preset, {checked.run.steps} training steps, seed {seed}"]
-    controls = " ".join(getattr(config.sampling_settings, "controls", ()))
-    parts += [controls, label, getattr(checked.sampler, "caption", "")]
-    return "; ".join(part for part in parts if part)
+def _requested(checked: Checked, samples: int, label: str) -> str:
+    """What the page shows, and what was requested."""
+    what = "The same speech, and different gestures for it" if samples > 1 else ""
+    controls = " ".join(getattr(checked.run.config.sampling_settings, "controls", ()))
+    return "; ".join(part for part in (what, controls, label, getattr(checked.sampler, "caption", "")) if part)
 
 
 def _counted(motions: Iterable[Motion], report: Callable[[int], None]) -> Iterator[Motion]:
@@ -107,16 +106,21 @@ def _counted(motions: Iterable[Motion], report: Callable[[int], None]) -> Iterat
         yield motion
 
 
-def checked_figure(motion: Motion, label: str, findings: Sequence[BodyFinding], note: str = "") -> Figure:
+def checked_figure(
+    motion: Motion, label: str, findings: Sequence[BodyFinding], note: str = "", files: tuple[str, ...] = ()
+) -> Figure:
     """A motion on the page; if it is outside the bounds of a body, with the worst finding under it and a lane of all.
 
     Args:
         note: under the label of a motion without findings.
+        files: names of its files beside the page.
     """
     if not findings:
-        return Figure(motion, label, note)
+        return Figure(motion, label, note, files=files)
     spans = tuple(
         (one.first / motion.fps, one.stop / motion.fps, str(one), "#c0392b")
         for one in sorted(findings, key=lambda one: one.first)
     )
-    return Figure(motion, label, f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),))
+    return Figure(
+        motion, label, f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),), files
+    )

@@ -144,7 +144,9 @@ class MotionFiles:
     def __exit__(self, *error: Any) -> bool | None:
         return self._staged.__exit__(*error)
 
-    def write(self, number: int, motion: "Motion", stem: str = "") -> None:
-        """Write the files of a motion."""
-        for each in self._formats.values():
-            each.write(self.folder / f"{stem or self._stem}_{number:02d}{each.suffix}", motion)
+    def write(self, number: int, motion: "Motion", stem: str = "") -> tuple[str, ...]:
+        """Write the files of a motion, and return their names."""
+        names = tuple(f"{stem or self._stem}_{number:02d}{each.suffix}" for each in self._formats.values())
+        for name, each in zip(names, self._formats.values(), strict=True):
+            each.write(self.folder / name, motion)
+        return names

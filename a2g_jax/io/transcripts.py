@@ -19,7 +19,7 @@ from a2g_jax.io.words import Word, is_word
 
 #: Largest time in a transcript, in seconds: a larger number is an error in units.
 _LONGEST = 1e6
-_SECONDS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{0,12})?s?")
+_SECONDS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{0,24})?s?")
 _PREVIEW = 64
 _LARGEST_FILE = 2**26
 #: Tolerance as a share of a frame: frame times and word times are both rounded decimals.

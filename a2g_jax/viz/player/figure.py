@@ -108,3 +108,5 @@ class Figure:
     label: str
     note: str = ""
     tracks: tuple[Lane, ...] = ()
+    files: tuple[str, ...] = ()
+    """Names of its files in the folder of the page, which offers them."""

@@ -152,6 +152,7 @@ def _figure(figure: Figure) -> dict:
         "wrists": list(shape.wrists),
         "place": placement(motion, points),
         "tracks": [track.encoded() for track in figure.tracks],
+        "files": list(figure.files),
         **encoded,
     }
 

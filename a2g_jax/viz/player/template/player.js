@@ -20,6 +20,7 @@ class Player {
     this.timeline = new Timeline(this);
     this.audio = this.loadAudio(speech);
     this.makeLabels();
+    this.makeFiles();
     fillLegend(this);
     this.makeControls();
     attachCamera(this.element("view"), this);
@@ -212,6 +213,23 @@ class Player {
       this.element("labels").append(label);
       return label;
     });
+  }
+
+  // Links to the files beside the page, those of each figure after its name.
+  makeFiles() {
+    for (const figure of this.figures.filter(({ files }) => files.length)) {
+      const group = document.createElement("span");
+      group.append(figure.label);
+      for (const name of figure.files) {
+        const link = document.createElement("a");
+        link.href = encodeURI(name);
+        link.download = name;
+        link.textContent = name.split(".").pop().toUpperCase();
+        link.title = `Download ${name}`;
+        group.append(link);
+      }
+      this.element("files").append(group);
+    }
   }
 
   // Labels stand under the feet; in the overlay they are a legend at the top.
