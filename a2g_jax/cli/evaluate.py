@@ -117,7 +117,7 @@ def _score(options: argparse.Namespace) -> dict[str, Any]:
         for flag in ("features", "emotion_classifier", "audit", "metric"):
             if getattr(options, flag):
                 raise InputError(f"--{flag.replace('_', '-')} is for runs that generate motion; leave it out.")
-        return classify_split(runs, corpus, split=options.split, seed=options.seed)
+        return classify_split(runs, corpus, split=options.split)
     network = load_feature_network(options.features, corpus) if options.features else None
     judge = load_emotion_judge(options.emotion_classifier, corpus) if options.emotion_classifier else None
     with progress_bar(1, "scoring", "motion") as bar:
