@@ -4,8 +4,8 @@
                                        [--out experiments/results/metric_audit]
 
 Generated recordings; the target is the recording's own motion. A dose of 0 is the truth itself. With a feature network
-(a run of motion_autoencoder on a 22-joint corpus at 30 fps) FGD and LPIPS are included, FGD where there are two vectors or more for each feature. Writes metric_audit.json and
-.png.
+(a run of motion_autoencoder on a 22-joint corpus at 30 fps) LPIPS is included, and FGD where there are two vectors or
+more for each feature. Writes metric_audit.json and .png.
 """
 
 import argparse

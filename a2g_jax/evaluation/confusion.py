@@ -13,6 +13,7 @@ from a2g_jax.data.batches import BatchMaker, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.likelihood_clips import recordings_of
+from a2g_jax.evaluation.seeds import describe_run
 from a2g_jax.metrics.intervals import share_interval
 from a2g_jax.metrics.labels import confusion
 from a2g_jax.training.perceptual import check_poses
@@ -39,10 +40,11 @@ def classify_split(
         stride: frames from one clip to the next; half a clip if None, as EmotionGesture cuts them.
 
     Returns:
-        ``about``, and for each classifier in ``classifiers``: ``input``, ``emotions``, ``confusion`` (clips by true and
-        predicted emotion), ``accuracy`` with a 95 % interval over recordings, ``balanced`` (mean over the emotions of
-        the split), ``recall`` and ``precision`` by emotion, ``chance`` (see :func:`chance_levels`), and the numbers of
-        ``clips``, ``recordings`` and clips ``left_out`` for an emotion that it does not have.
+        ``about``, and for each classifier in ``classifiers``: ``run`` (what the run is), ``input``, ``emotions``,
+        ``confusion`` (clips by true and predicted emotion), ``accuracy`` with a 95 % interval over recordings,
+        ``balanced`` (mean over the emotions of the split), ``recall`` and ``precision`` by emotion, ``chance`` (see
+        :func:`chance_levels`), and the numbers of ``clips``, ``recordings`` and clips ``left_out`` for an emotion that
+        it does not have.
 
     Raises:
         InputError: a run that is no classifier or takes other features, or a split without a clip for it.
@@ -100,6 +102,7 @@ def _classified(name: str, run: Run, corpus: Corpus, split: str, stride: int | N
     recording = recordings_of(corpus, starts)
     return {
         "model": config.model,
+        "run": describe_run(run),
         "input": classifier.input,
         "trained_on": config.corpus.get("fingerprint"),
         **scores(logits, labels, recording, len(names)),

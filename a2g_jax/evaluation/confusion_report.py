@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from a2g_jax.evaluation.report_cells import describe
 from a2g_jax.io.staging import staged
 from a2g_jax.metrics.intervals import LEAST
 
@@ -65,7 +66,8 @@ def markdown(result: dict[str, Any]) -> str:
     ]
     for name, one in result["classifiers"].items():
         names = one["emotions"]
-        lines += ["", f"## {name}", "", "| is \\ classified as | " + " | ".join(names) + " | recall |"]
+        lines += ["", f"## {name}", "", describe({"name": one["input"], "run": one["run"]}) + ".", ""]
+        lines += ["| is \\ classified as | " + " | ".join(names) + " | recall |"]
         lines.append("|" + " --- |" * (len(names) + 2))
         for emotion, counts, recall in zip(names, one["confusion"], one["recall"], strict=True):
             share = "-" if recall is None else f"{recall:.3f}"

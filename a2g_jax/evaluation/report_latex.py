@@ -1,5 +1,6 @@
 """The report of an evaluation as LaTeX tables for a paper; they need the package booktabs."""
 
+import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ from a2g_jax.evaluation.report_cells import (
     title,
     unit,
 )
+from a2g_jax.evaluation.row_names import HALVES
 from a2g_jax.evaluation.scores import Metric
 
 #: Width and height of the text of an article of 10 points, points; a table leaves some of the height to its page.
@@ -25,15 +27,32 @@ TEXT_WIDTH, TEXT_HEIGHT = 345.0, 510.0
 #: Half of the space between columns, points.
 _SEPARATION = 3.0
 #: Most characters in a line of the first column and of a head.
-_NAME, _HEAD = 22, 15
+_NAME, _HEAD = 20, 15
+#: Baselines by names that fit a line.
+_SHORT = {
+    "another right motion": "other right motion",
+    "truth, 1 degree of noise": "truth, 1° of noise",
+    "truth, 5 degrees of noise": "truth, 5° of noise",
+    "nearest neighbour in audio": "nearest in audio",
+    "another clip's motion": "another clip",
+    HALVES: "half of the truth",
+}
 _RULES = 14.0
 
 
 class Shown(NamedTuple):
-    """What a cell shows: LaTeX, and the same as plain text, for its width."""
+    """What a cell shows: LaTeX, and its width in points."""
 
     latex: str
-    plain: str
+    width: float
+
+
+class Line(NamedTuple):
+    """A line of a table: a row of the report, or the best of its samples."""
+
+    name: list[str]
+    row: int
+    best: bool
 
 
 class Column(NamedTuple):
@@ -45,21 +64,22 @@ class Column(NamedTuple):
     @property
     def width(self) -> float:
         """Points, with the space to the next column."""
-        return 2 * _SEPARATION + max(width(one.plain, bold=True) for one in (*self.head, *self.cells))
+        return 2 * _SEPARATION + max(one.width for one in (*self.head, *self.cells))
 
 
 def latex(result: dict[str, Any]) -> str:
     """Tables that fit the page of an article: blocks of columns, each as wide as the text, of all rows.
 
-    Means with their intervals, in round brackets the best of the samples; units in the head; bold by
+    Means with their intervals, under them the best of the samples; units in the head; bold by
     :func:`~a2g_jax.evaluation.report_cells.best_runs`, which the caption explains; a dash as in Markdown.
     """
-    rows = result["rows"]
-    names = _names(rows)
-    made = [_column(metric, result) for metric in columns(result)]
+    table = _lines(result["rows"])
+    names = [line.name for line in table]
+    made = [_column(metric, result, table) for metric in columns(result)]
     lines = [comment("Needs \\usepackage{booktabs}; made by a2g evaluate."), *(comment(one) for one in _origin(result))]
     name_width = max([2 * _SEPARATION, *(width(line) for name in names for line in name)])
-    block_height = _RULES + LINE * (sum(len(name) for name in names) + max([0, *(len(one.head) for one in made)]))
+    lines_of_block = sum(len(name) for name in names) + max([0, *(len(one.head) for one in made)])
+    block_height = _RULES + LINE * lines_of_block
     blocks = _blocks(made, TEXT_WIDTH - name_width)
     for number, page in enumerate(_pages(blocks, block_height, _caption_height(_caption(result)))):
         caption = _caption(result) if number == 0 else "The scores of the table before, continued."
@@ -76,6 +96,8 @@ def _tabular(names: Sequence[list[str]], block: Sequence[Column]) -> list[str]:
     lines = [rf"\begin{{tabular}}{{@{{}}l{'r' * len(block)}@{{}}}}", r"\toprule", " & ".join(["", *head]) + r" \\"]
     lines.append(r"\midrule")
     for place, name in enumerate(names):
+        if all(not column.cells[place].latex for column in block):
+            continue  # the best sample, where no column of the block has one
         cells = [column.cells[place].latex for column in block]
         lines.append(" & ".join([_stack([escape(line) for line in name], "t", "l"), *cells]) + r" \\")
     return [*lines, r"\bottomrule", r"\end{tabular}", r"\par\medskip"]
@@ -88,27 +110,33 @@ def _stack(lines: Sequence[str], place: str, side: str) -> str:
     return rf"\begin{{tabular}}[{place}]{{@{{}}{side}@{{}}}}" + r" \\ ".join(lines) + r"\end{tabular}"
 
 
-def _names(rows: Sequence[dict[str, Any]]) -> list[list[str]]:
-    """The lines of the first column."""
-    return [textwrap.wrap(" ".join(row["name"].split()), _NAME) or [""] for row in rows]
+def _lines(rows: Sequence[dict[str, Any]]) -> list[Line]:
+    """The lines of a table."""
+    lines = []
+    for place, row in enumerate(rows):
+        name = " ".join(_SHORT.get(row["name"], row["name"]).split())
+        lines.append(Line(textwrap.wrap(name, _NAME) or [""], place, False))
+        if row["samples"] > 1 and any(cell["best"] is not None for cell in row["scores"].values()):
+            lines.append(Line([f"best of {row['samples']}"], place, True))
+    return lines
 
 
-def _column(metric: Metric, result: dict[str, Any]) -> Column:
+def _column(metric: Metric, result: dict[str, Any], table: Sequence[Line]) -> Column:
     about = result["about"]
-    head = [Shown(escape(line), line) for line in textwrap.wrap(title(metric, about), _HEAD)]
-    name = unit(metric, about)
-    head.append(Shown(f"{unit_text(name)} {escape(ARROWS[metric.better])}".strip(), f"{name} {ARROWS[metric.better]}"))
+    head = [Shown(escape(line), width(line)) for line in textwrap.wrap(title(metric, about), _HEAD)]
+    name, arrow = unit(metric, about), ARROWS[metric.better]
+    head.append(Shown(f"{unit_text(name)} {escape(arrow)}".strip(), width(f"{name} {arrow}")))
     best = best_runs(result, metric)
-    cells = [
-        _cell(row["scores"].get(metric.key), metric, row["samples"] > 1, place in best)
-        for place, row in enumerate(result["rows"])
-    ]
+    cells = []
+    for line in table:
+        cell = result["rows"][line.row]["scores"].get(metric.key)
+        cells.append(_best_cell(cell, metric) if line.best else _cell(cell, metric, line.row in best))
     return Column(head, cells)
 
 
-def _cell(cell: dict[str, Any] | None, metric: Metric, several: bool, best: bool) -> Shown:
+def _cell(cell: dict[str, Any] | None, metric: Metric, bold: bool) -> Shown:
     if cell is None or not has_value(cell):
-        return Shown("--", "--")
+        return Shown("--", width("--"))
     show = lambda value: f"{value:.{metric.digits}f}"  # noqa: E731
     mean, rest = show(cell["mean"]), ""
     if has_interval(cell):
@@ -116,18 +144,20 @@ def _cell(cell: dict[str, Any] | None, metric: Metric, several: bool, best: bool
         rest = f" ± {above}" if below == above else f" [{show(cell['low'])}, {show(cell['high'])}]"
     elif lacks_interval(cell):
         rest = " [--]"
-    if several and cell["best"] is not None:
-        rest += f" ({show(cell['best'])})"
     number = _number(mean)
-    return Shown((rf"\textbf{{{number}}}" if best else number) + _number(rest), mean + rest)
+    return Shown((rf"\textbf{{{number}}}" if bold else number) + _number(rest), width(mean, True) + width(rest))
+
+
+def _best_cell(cell: dict[str, Any] | None, metric: Metric) -> Shown:
+    if cell is None or cell["best"] is None:
+        return Shown("", 0.0)
+    text = f"{cell['best']:.{metric.digits}f}"
+    return Shown(_number(text), width(text))
 
 
 def _number(text: str) -> str:
     """Signs of numbers as minus signs, and ± as in mathematics."""
-    signed = "".join(
-        "$-$" if one == "-" and after.isdigit() else one for one, after in zip(text, text[1:] + " ", strict=True)
-    )
-    return signed.replace("±", r"$\pm$")
+    return re.sub(r"-(?=\d)", "$-$", text).replace("±", r"$\pm$")
 
 
 def _blocks(made: Sequence[Column], room: float) -> list[list[Column]]:
@@ -177,7 +207,7 @@ def _caption(result: dict[str, Any]) -> str:
         f"± and square brackets: 95 % intervals over {over}{', of rows of several seeds over seeds' if seeds else ''}.",
     ]
     if any(row["samples"] > 1 for row in rows):
-        parts.append(f"Means over {about['samples']} samples, in round brackets the best of them.")
+        parts.append(f"Means over {about['samples']} samples, under them the best sample of each clip.")
     if len([row for row in rows if row.get("run")]) > 1:
         parts.append(
             "Bold: the best run of a column (≈: the nearest to the truth), and runs whose interval includes its mean"

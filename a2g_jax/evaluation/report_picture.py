@@ -17,12 +17,21 @@ _COLUMNS = 4
 _RUN, _BASELINE, _INK = "#2f6fde", "#b7c0cc", "#1b2433"
 
 
-def limit_of(values: Sequence[float]) -> float | None:
+def limit_of(values: Sequence[float], runs: Sequence[float] = ()) -> float | None:
     """The greatest value that is drawn at full length; None where all are.
 
     The greatest ones are cut one after another as long as each exceeds the next by :data:`FACTOR`, but at most half of
     them, so that two rows of noise do not flatten the others.
+
+    Args:
+        values: of all rows.
+        runs: of those that are runs: the limit is as far as they need, an exception among them apart.
     """
+    found = _limit(values)
+    return None if found is None else max([found, *([_limit(runs) or max(map(abs, runs))] if runs else [])])
+
+
+def _limit(values: Sequence[float]) -> float | None:
     sizes = sorted((abs(value) for value in values), reverse=True)
     cut = 0
     for place in range(len(sizes) // 2):
@@ -63,7 +72,12 @@ def save_picture(result: dict[str, Any], path: Path) -> None:
 def _panel(panel: Any, metric: Metric, rows: Sequence[dict[str, Any]]) -> None:
     cells = [row["scores"].get(metric.key) for row in rows]
     values = [cell["mean"] for cell in cells if has_value(cell)]
-    limit = limit_of(values)
+    runs = [
+        row["scores"][metric.key]["mean"]
+        for row in rows
+        if row["name"] not in BASELINES and has_value(row["scores"].get(metric.key))
+    ]
+    limit = limit_of(values, runs)
     ends = [abs(end) for cell in cells if has_value(cell) for end in _ends(cell) if limit is None or abs(end) <= limit]
     if limit is not None:
         # Intervals of bars at full length may end beyond the limit.
@@ -73,9 +87,7 @@ def _panel(panel: Any, metric: Metric, rows: Sequence[dict[str, Any]]) -> None:
     if limit is not None:
         right = 1.45 * reach  # room for the numbers of cut bars
     for place, (row, cell) in enumerate(zip(rows, cells, strict=True)):
-        if cell is None:
-            continue
-        if not has_value(cell):
+        if cell is None or not has_value(cell):
             panel.text(0.01 * reach, place, "-", va="center", fontsize=9, color=_INK)
             continue
         colour = _BASELINE if row["name"] in BASELINES else _RUN
@@ -90,9 +102,7 @@ def _panel(panel: Any, metric: Metric, rows: Sequence[dict[str, Any]]) -> None:
     floors = {cell["floor"] for cell in cells if cell and cell.get("floor") is not None}
     for floor in floors:
         panel.axvline(floor, color="#c2554d", linewidth=1.0, linestyle=":")
-        panel.text(
-            floor, len(rows) - 0.4, f" floor {floor:.{metric.digits}f}", fontsize=7, color="#c2554d", va="bottom"
-        )
+        panel.text(floor, -0.55, f" floor {floor:.{metric.digits}f}", fontsize=7, color="#c2554d", va="bottom")
     panel.set_xlim(left, right)
 
 

@@ -47,7 +47,6 @@ TABLE = Table(
 def confused(name: str, run: Run, ruler: Ruler, seed: int) -> dict[str, Any]:
     """Accuracies and confusion matrix on the test split."""
     del seed  # nothing is drawn
-    del seed  # nothing is drawn
     found = classify_split({name: run}, ruler.corpus, split=ruler.split)["classifiers"][name]
     shares = dict(zip(found["emotions"], found["recall"], strict=True))
     return {
