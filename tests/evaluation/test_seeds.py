@@ -16,7 +16,8 @@ from a2g_jax.training.run_config import Source
 def row(name, seed, mean, settings="s", weights=None, **cell):
     """A row of a run."""
     run = {"model": "flow", "preset": "tiny", "steps": 10, "seed": seed, "settings": settings}
-    scores = {"x": {"mean": mean, "low": None, "high": None, "best": mean - 1.0, "clips": 7, **cell}}
+    best = None if mean is None else mean - 1.0
+    scores = {"x": {"mean": mean, "low": None, "high": None, "best": best, "clips": 7, **cell}}
     run |= {"weights": weights or f"{name} {seed}", "corpus": "c"}
     return {"name": name, "samples": 2, "scores": scores, "emotions": None, "run": run}
 
@@ -101,7 +102,6 @@ def test_copies_and_repeated_seeds_count_once():
 
 def test_a_dash_of_one_seed_is_a_dash_of_all():
     rows = [row("a", 0, 1.0), row("b", 1, None, reason="too few"), row("c", 2, 2.0)]
-    rows[1]["scores"]["x"]["best"] = None
     cell = group_seeds(rows)[0]["scores"]["x"]
     assert [cell[key] for key in ("mean", "low", "high", "best")] == [None] * 4
 
