@@ -22,7 +22,7 @@ from a2g_jax.metrics.pooled import jackknife
 
 #: Samples of a candidate from which the interval is computed; the value is the mean over all.
 _SAMPLES = 4
-Vectors = Float[np.ndarray, "n F"]
+Vectors = Float[np.ndarray, "_ F"]
 
 
 @dataclass(frozen=True, eq=False)

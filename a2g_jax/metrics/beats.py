@@ -11,8 +11,8 @@ Times = Float[np.ndarray, " _"]
 
 #: Tolerance of the beat alignment from motion to audio in a report, seconds, at any frame rate.
 SIGMA = 1.0 / 6.0
-#: Tolerances of the papers, seconds: of BEAT, also of HA2G; the other one of HA2G.
-BEAT_SIGMA, HA2G_SIGMA = 0.1, 0.3
+#: Tolerances of BEAT and HA2G, seconds.
+BEAT_SIGMA, WIDE_SIGMA = 0.1, 0.3
 #: The flow paper and AI Choreographer count in frames; :func:`frames_to_seconds` converts them.
 FLOW_SIGMA_FRAMES, CHOREOGRAPHER_SIGMA_FRAMES = 5.0, 3.0
 #: Standard deviation of the Gaussian over the speed in a report, seconds, at any frame rate.
@@ -56,7 +56,7 @@ def beat_alignment(of: Times, to: Times, sigma: float) -> float:
     onsets (``of`` audio ``to`` motion).
 
     Args:
-        sigma: tolerance in seconds; the papers' are :data:`BEAT_SIGMA`, :data:`HA2G_SIGMA`, and
+        sigma: tolerance in seconds; the papers' are :data:`BEAT_SIGMA`, :data:`WIDE_SIGMA`, and
             :data:`FLOW_SIGMA_FRAMES` and :data:`CHOREOGRAPHER_SIGMA_FRAMES` by :func:`frames_to_seconds`.
     """
     if len(of) == 0 or len(to) == 0:
