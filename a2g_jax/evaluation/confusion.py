@@ -55,7 +55,7 @@ def classify_split(
             raise InputError(f"{name}: is a run of {run.config.model}, which is no classifier.")
         _check(name, run, corpus)
         found[name] = _classified(name, run, corpus, split, stride)
-    about = {"package": __version__, "corpus": corpus.fingerprint, "split": split}
+    about: dict[str, Any] = {"package": __version__, "corpus": corpus.fingerprint, "split": split}
     about["recipe"] = {key: value for key, value in corpus.recipe.items() if key != "roles"}
     return {"about": about, "classifiers": found}
 

@@ -73,7 +73,7 @@ def group_seeds(rows: Sequence[Row]) -> list[Row]:
     made: list[Row] = []
     for row in rows:
         key = _key(row) if row.get("run") else None
-        if key not in groups:
+        if key is None or key not in groups:
             made.append(row)
         elif row is groups[key][0]:
             name = _name(groups[key])

@@ -20,8 +20,9 @@ from a2g_jax.metrics.distribution import LEAST_VECTORS, enough_vectors, halvings
 from a2g_jax.metrics.intervals import LEAST
 from a2g_jax.metrics.pooled import jackknife
 
-#: Samples of a candidate from which the interval is computed; the value is the mean over all.
-_SAMPLES = 4
+#: Samples of a candidate from which the interval is computed, and for sets of more vectors than the second number, whose
+#: silhouettes take seconds each; the value is the mean over all samples.
+_SAMPLES, _MANY, _SAMPLES_OF_MANY = 4, 1000, 1
 Vectors = Float[np.ndarray, "_ F"]
 
 
@@ -113,10 +114,11 @@ def set_cell(metric: Metric, made: Sequence[Vectors], reference: Reference) -> d
     if any(value is None for value in values):
         return None
     mean = float(np.mean(values))
+    some = made[: _SAMPLES if count <= _MANY else _SAMPLES_OF_MANY]
 
     def left(chosen: Sequence[int]) -> float:
         rows = np.concatenate([reference.members[one] for one in chosen])
-        return float(np.mean([_number(_value(metric, one, reference, rows)) for one in made[:_SAMPLES]]))
+        return float(np.mean([_number(_value(metric, one, reference, rows)) for one in some]))
 
     found = jackknife(left, len(reference.members), mean).to_json()
     low, high = found["low"], found["high"]
@@ -125,7 +127,9 @@ def set_cell(metric: Metric, made: Sequence[Vectors], reference: Reference) -> d
     best = {"lower": min, "higher": max}.get(metric.better)
     cell = {"mean": found["mean"], "low": low, "high": high, "best": None if best is None else float(best(values))}
     cell |= {"clips": len(reference.members), **about}
-    if len(reference.members) < LEAST:
+    if found["mean"] is None:
+        cell["reason"] = "a feature vector is not a number"
+    elif len(reference.members) < LEAST:
         cell["reason"] = too_few_recordings(len(reference.members))
     if metric.distance:
         pairs = [(made[number % len(made)], rows) for number, rows in enumerate(reference.halves)]
