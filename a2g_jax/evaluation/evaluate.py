@@ -22,7 +22,7 @@ from a2g_jax.evaluation.report_cells import describe_metrics
 from a2g_jax.evaluation.row_names import HALVES, MOTIONS
 from a2g_jax.evaluation.scores import METRICS, Metric, Scorer, Target
 from a2g_jax.evaluation.seeds import describe_run, group_seeds
-from a2g_jax.evaluation.set_scores import Reference, floor_of, halves_cell, set_cells
+from a2g_jax.evaluation.set_scores import Reference, halves_cell, set_cells
 from a2g_jax.evaluation.summary import sample_cells
 from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
@@ -160,9 +160,9 @@ def evaluate(
             cells = sample_cells(scorer, per_clip, per_group, owners) | set_cells(scorer, features, reference)
             emotions = None if tally is None else tally.to_json()
             rows.append(Row(name, count, cells, emotions, describe_run(runs[name]) if name in runs else None))
-    floor = floor_of(METRICS["fgd"], reference) if reference.enough else None
-    if baselines and floor is not None:
-        rows.append(Row(HALVES, 1, {"fgd": halves_cell(floor, reference)}))
+    halves = None if network is None else halves_cell(METRICS["fgd"], reference)
+    if baselines and halves is not None:
+        rows.append(Row(HALVES, 1, {"fgd": halves}))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -180,7 +180,7 @@ def evaluate(
         "unit": scorer.space.unit,
         "feature_vectors": len(reference.vectors),
         "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
-        "floor": floor,
+        "floor": None if halves is None else halves["mean"],
         "feature_width": None if network is None else network.features,
         "short_clips": short,
         "units": units.key,

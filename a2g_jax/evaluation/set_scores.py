@@ -144,11 +144,13 @@ def floor_of(metric: Metric, reference: Reference) -> float:
     return _mean_distance(metric, [(reference.vectors, rows) for rows in reference.halves], reference)
 
 
-def halves_cell(floor: float, reference: Reference) -> dict[str, Any]:
-    """The distance of two halves of the truth, as a cell of a report."""
-    rest = {"low": None, "high": None, "best": None}
+def halves_cell(metric: Metric, reference: Reference) -> dict[str, Any]:
+    """The distance of two halves of the truth as a cell of a report; a dash with its reason for too few vectors."""
+    cell: dict[str, Any] = dict.fromkeys(("mean", "low", "high", "best"))
+    if not reference.enough:
+        return {**cell, "reason": reference.shortage()}
     about = {"vectors": len(reference.halves[0][0]), "features": reference.vectors.shape[1]}
-    return {"mean": floor, **rest, **about}
+    return {**cell, "mean": floor_of(metric, reference), **about}
 
 
 def _mean_distance(

@@ -21,7 +21,7 @@ from a2g_jax.evaluation.feature_network import vectors_of
 from a2g_jax.evaluation.likelihood_clips import recordings_of
 from a2g_jax.evaluation.row_names import HALVES
 from a2g_jax.evaluation.scores import METRICS
-from a2g_jax.evaluation.set_scores import Reference, floor_of, halves_cell, set_cell
+from a2g_jax.evaluation.set_scores import Reference, halves_cell, set_cell
 from a2g_jax.generation.continuation import continue_clips
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.metrics import beats, diversity, physical
@@ -183,8 +183,7 @@ def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str
     }
     if ruler.network is not None:
         reference = _reference(ruler, list(inner), recordings_of(ruler.corpus, starts), seed)
-        if reference.enough:
-            rows[HALVES] = {"fgd": halves_cell(floor_of(METRICS["fgd"], reference), reference)}
+        rows[HALVES] = {"fgd": halves_cell(METRICS["fgd"], reference)}
     return rows
 
 

@@ -161,9 +161,11 @@ def with_clips_of(network, frames):
 def test_few_vectors_have_no_fgd_few_recordings_no_interval_and_less_than_two_vectors_are_refused(corpus, network):
     three = dataclasses.replace(corpus, splits={**corpus.splits, "few": corpus.splits["train"][:3]})
     table = evaluate({}, three, split="few", network=network, samples=1)
-    assert {row["name"] for row in table["rows"]} == set(MOTIONS)
+    assert [row["name"] for row in table["rows"]] == list(BASELINES)
     for row in table["rows"]:
         assert [row["scores"]["fgd"][key] for key in ("mean", "low", "high", "best")] == [None] * 4
+        if row["name"] == HALVES:
+            continue
         cell = row["scores"]["position_l1"]
         assert cell["mean"] >= 0.0
         assert (cell["low"], cell["high"], cell["clips"]) == (None, None, 3)
