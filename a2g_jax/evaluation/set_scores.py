@@ -20,8 +20,8 @@ from a2g_jax.metrics.distribution import LEAST_VECTORS, enough_vectors, halvings
 from a2g_jax.metrics.intervals import LEAST
 from a2g_jax.metrics.pooled import jackknife
 
-#: Samples of a candidate from which the interval is computed, and for sets of more vectors than the second number, whose
-#: silhouettes take seconds each; the value is the mean over all samples.
+#: Samples of a candidate from which the interval is computed, fewer for sets of more vectors than the second number,
+#: whose silhouettes take seconds each; the value is the mean over all samples.
 _SAMPLES, _MANY, _SAMPLES_OF_MANY = 4, 1000, 1
 Vectors = Float[np.ndarray, "_ F"]
 
