@@ -4,8 +4,8 @@
                                        [--out experiments/results/metric_audit]
 
 Generated recordings; the target is the recording's own motion. A dose of 0 is the truth itself. With a feature network
-(a run of motion_autoencoder on a 22-joint corpus at 30 fps) FGD and LPIPS are included. Writes metric_audit.json and
-.png.
+(a run of motion_autoencoder on a 22-joint corpus at 30 fps) LPIPS is included, and FGD where there are two vectors or
+more for each feature. Writes metric_audit.json and .png.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from a2g_jax.geometry.retarget import find_rig
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import atomic_path, make_folder, sha256_file, write_json
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.distribution import frechet_distance
+from a2g_jax.metrics.distribution import enough_vectors, frechet_distance
 from a2g_jax.talker.recordings import cast, talk
 from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.training.run import WEIGHTS_FILE, load_run
@@ -123,7 +123,7 @@ def measure(options: argparse.Namespace) -> dict[str, Any]:
             scores.append(scorer.sample(pose, target))
             features.append(scorer.features(pose))
         means = {name: float(np.nanmean([each[name] for each in scores])) for name in scores[0]}
-        if len(reference) > 1:
+        if enough_vectors(*reference.shape):
             means["fgd"] = frechet_distance(np.concatenate(features), reference).value
         return means
 

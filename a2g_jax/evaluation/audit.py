@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval, t_quantile
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speed_peaks
 
 LogMel = Float[np.ndarray, "_ bands"]
@@ -26,8 +26,6 @@ DEAF = 0.1
 #: It follows loudness alone if the level alone restores this share of what silence changes, and its rhythm is lost with
 #: an even level.
 LOUDNESS = 0.75
-#: Standard errors from which a difference counts as significant.
-SIGNIFICANT = 2.0
 
 
 class AudioCondition(NamedTuple):
@@ -116,11 +114,9 @@ def listening_audit(
 
 
 def _interval(values: list[float]) -> list[float] | None:
-    """95 % interval over clips, by bootstrap; None for a single clip."""
-    if len(values) < 2:
-        return None
-    interval = bootstrap_mean(np.array(values), np.random.default_rng(0))
-    return [interval.low, interval.high]
+    """95 % interval over clips; None for too few."""
+    interval = mean_interval(np.array(values))
+    return None if np.isnan(interval.low) else [interval.low, interval.high]
 
 
 def _verdicts(table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], noise: float) -> list[str]:
@@ -141,12 +137,12 @@ def _verdicts(table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], 
 
 
 def _significantly_more(values: Float[np.ndarray, " n"], others: Float[np.ndarray, " n"]) -> bool:
-    """Whether the paired difference over clips is significantly above zero; for a single clip, whether it is large."""
+    """Whether the 95 % interval of the paired difference is above zero; for a single clip, whether it is large."""
     difference = values - others
     if len(difference) < 2:
         return bool(difference.mean() > 0.05)
     error = difference.std(ddof=1) / np.sqrt(len(difference))
-    return bool(difference.mean() > max(SIGNIFICANT * error, 1e-3))
+    return bool(difference.mean() > max(t_quantile(len(difference)) * error, 1e-3))
 
 
 def _distance(first: Points, second: Points) -> float:

@@ -12,7 +12,9 @@ from a2g_jax.data.batch import clip_shape, gather_clips, gather_from_disk
 from a2g_jax.data.batches import BatchMaker, tiled_starts
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
-from a2g_jax.metrics.intervals import bootstrap_ratio
+from a2g_jax.evaluation.likelihood_clips import recordings_of
+from a2g_jax.evaluation.seeds import describe_run
+from a2g_jax.metrics.intervals import share_interval
 from a2g_jax.metrics.labels import confusion
 from a2g_jax.training.perceptual import check_poses
 from a2g_jax.training.run import Run
@@ -27,7 +29,7 @@ def is_classifier(run: Run) -> bool:
 
 
 def classify_split(
-    runs: Mapping[str, Run], corpus: Corpus, *, split: str = "test", stride: int | None = None, seed: int = 0
+    runs: Mapping[str, Run], corpus: Corpus, *, split: str = "test", stride: int | None = None
 ) -> dict[str, Any]:
     """Confusion matrices of classifiers on the clips of a split; JSON-able.
 
@@ -36,13 +38,13 @@ def classify_split(
         corpus: with emotions.
         split: a split of it.
         stride: frames from one clip to the next; half a clip if None, as EmotionGesture cuts them.
-        seed: of the bootstrap.
 
     Returns:
-        ``about``, and for each classifier in ``classifiers``: ``input``, ``emotions``, ``confusion`` (clips by true and
-        predicted emotion), ``accuracy`` with a 95 % interval over recordings, ``balanced`` (mean over the emotions of
-        the split), ``recall`` and ``precision`` by emotion, ``chance`` (see :func:`chance_levels`), and the numbers of
-        ``clips``, ``recordings`` and clips ``left_out`` for an emotion that it does not have.
+        ``about``, and for each classifier in ``classifiers``: ``run`` (what the run is), ``input``, ``emotions``,
+        ``confusion`` (clips by true and predicted emotion), ``accuracy`` with a 95 % interval over recordings,
+        ``balanced`` (mean over the emotions of the split), ``recall`` and ``precision`` by emotion, ``chance`` (see
+        :func:`chance_levels`), and the numbers of ``clips``, ``recordings`` and clips ``left_out`` for an emotion that
+        it does not have.
 
     Raises:
         InputError: a run that is no classifier or takes other features, or a split without a clip for it.
@@ -52,8 +54,8 @@ def classify_split(
         if not is_classifier(run):
             raise InputError(f"{name}: is a run of {run.config.model}, which is no classifier.")
         _check(name, run, corpus)
-        found[name] = _classified(name, run, corpus, split, stride, seed)
-    about = {"package": __version__, "corpus": corpus.fingerprint, "split": split, "seed": seed}
+        found[name] = _classified(name, run, corpus, split, stride)
+    about: dict[str, Any] = {"package": __version__, "corpus": corpus.fingerprint, "split": split}
     about["recipe"] = {key: value for key, value in corpus.recipe.items() if key != "roles"}
     return {"about": about, "classifiers": found}
 
@@ -71,7 +73,7 @@ def _check(name: str, run: Run, corpus: Corpus) -> None:
         )
 
 
-def _classified(name: str, run: Run, corpus: Corpus, split: str, stride: int | None, seed: int) -> dict[str, Any]:
+def _classified(name: str, run: Run, corpus: Corpus, split: str, stride: int | None) -> dict[str, Any]:
     config, model = run.config, run.config.build()
     classifier, names = model.classifier, list(run.config.corpus["emotions"])
     assert classifier is not None
@@ -97,13 +99,13 @@ def _classified(name: str, run: Run, corpus: Corpus, split: str, stride: int | N
         clips = gather_clips(arrays, shape, padded, gather_from_disk)
         parts.append(np.asarray(logits_of(run.params, maker(None, clips)))[: len(some)])
     logits = np.concatenate(parts)
-    firsts = np.array([entry.first for entry in corpus.recordings])
-    recording = np.searchsorted(firsts, starts, side="right") - 1
+    recording = recordings_of(corpus, starts)
     return {
         "model": config.model,
+        "run": describe_run(run),
         "input": classifier.input,
         "trained_on": config.corpus.get("fingerprint"),
-        **scores(logits, labels, recording, len(names), np.random.default_rng(seed)),
+        **scores(logits, labels, recording, len(names)),
         "emotions": names,
         "left_out": every - len(starts),
     }
@@ -114,35 +116,29 @@ def scores(
     labels: Int[np.ndarray, " N"],
     recordings: Int[np.ndarray, " N"],
     classes: int,
-    rng: np.random.Generator,
 ) -> dict[str, Any]:
     """Confusion matrix and accuracies of classified clips.
 
     Args:
-        recordings: the recording of every clip, over which the interval is drawn: clips of one are not independent.
+        recordings: the recording of every clip, which the interval is over: clips of one are not independent.
     """
     counts = confusion(logits, labels)
     hits = np.argmax(logits, axis=-1) == labels
     groups = np.unique(recordings)
     own_hits = np.array([hits[recordings == one].sum() for one in groups])
-    interval = bootstrap_ratio(own_hits, np.array([np.sum(recordings == one) for one in groups]), rng)
+    interval = share_interval(own_hits, np.array([np.sum(recordings == one) for one in groups])).to_json()
     true, predicted = counts.sum(axis=1), counts.sum(axis=0)
     recall = [float(counts[k, k] / true[k]) if true[k] else None for k in range(classes)]
     return {
         "confusion": counts.tolist(),
         "clips": len(labels),
         "recordings": len(groups),
-        "accuracy": {"mean": interval.mean, "low": _number(interval.low), "high": _number(interval.high)},
+        "accuracy": {key: interval[key] for key in ("mean", "low", "high")},
         "balanced": float(np.mean([value for value in recall if value is not None])),
         "recall": recall,
         "precision": [float(counts[k, k] / predicted[k]) if predicted[k] else None for k in range(classes)],
         "chance": chance_levels(counts),
     }
-
-
-def _number(value: float) -> float | None:
-    """None for NaN, which JSON does not have."""
-    return None if np.isnan(value) else value
 
 
 def chance_levels(counts: Int[np.ndarray, "K K"]) -> dict[str, float]:

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from a2g_jax.evaluation.report_cells import describe
 from a2g_jax.io.staging import staged
+from a2g_jax.metrics.intervals import LEAST
 
 
 def write_confusion(result: dict[str, Any], out: Path) -> list[Path]:
@@ -50,7 +52,7 @@ def markdown(result: dict[str, Any]) -> str:
     ]
     for name, one in result["classifiers"].items():
         accuracy, chance = one["accuracy"], one["chance"]
-        interval = "" if accuracy["low"] is None else f" [{accuracy['low']:.3f}, {accuracy['high']:.3f}]"
+        interval = " [-]" if accuracy["low"] is None else f" [{accuracy['low']:.3f}, {accuracy['high']:.3f}]"
         cells = [name, one["input"], str(one["clips"]), str(one["recordings"]), f"{accuracy['mean']:.3f}{interval}"]
         cells += [
             f"{value:.3f}" for value in (one["balanced"], *(chance[k] for k in ("uniform", "commonest", "shuffled")))
@@ -58,12 +60,14 @@ def markdown(result: dict[str, Any]) -> str:
         lines.append("| " + " | ".join(cells) + " |")
     lines += [
         "",
-        "Brackets hold 95 % intervals over recordings (bootstrap). Balanced is the mean over emotions. The last three",
+        "Brackets hold 95 % intervals over recordings (Wilson's, with the effective number of clips by the spread over",
+        f"recordings; a dash for fewer than {LEAST} recordings). Balanced is the mean over emotions. The last three",
         "columns are chance: a random emotion, always the commonest one, the classifier's own answers in random order.",
     ]
     for name, one in result["classifiers"].items():
         names = one["emotions"]
-        lines += ["", f"## {name}", "", "| is \\ classified as | " + " | ".join(names) + " | recall |"]
+        lines += ["", f"## {name}", "", describe({"name": one["input"], "run": one["run"]}) + ".", ""]
+        lines += ["| is \\ classified as | " + " | ".join(names) + " | recall |"]
         lines.append("|" + " --- |" * (len(names) + 2))
         for emotion, counts, recall in zip(names, one["confusion"], one["recall"], strict=True):
             share = "-" if recall is None else f"{recall:.3f}"

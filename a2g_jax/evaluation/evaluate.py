@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,27 +13,21 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_integrity import verify_corpus
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.evaluation.arrays import Pose
 from a2g_jax.evaluation.audit import AudioCondition, listening_audit
-from a2g_jax.evaluation.baselines import (
-    first_pose,
-    mean_pose,
-    nearest_neighbour,
-    other_clip,
-    right_motions,
-    with_noise,
-)
+from a2g_jax.evaluation.candidates import candidates
 from a2g_jax.evaluation.emotion_judge import EmotionJudge, relevance
 from a2g_jax.evaluation.emotion_tables import EmotionTally, accuracy_by_chance
 from a2g_jax.evaluation.feature_network import FeatureNetwork, check_separate, vectors_of
-from a2g_jax.evaluation.report import HALVES, MOTIONS, describe_metrics
-from a2g_jax.evaluation.scores import Metric, Scorer, Target
-from a2g_jax.evaluation.summary import summarise
+from a2g_jax.evaluation.report_cells import describe_metrics
+from a2g_jax.evaluation.row_names import HALVES, MOTIONS
+from a2g_jax.evaluation.scores import METRICS, Metric, Scorer, Target
+from a2g_jax.evaluation.seeds import describe_run, group_seeds
+from a2g_jax.evaluation.set_scores import Reference, halves_cell, set_cells
+from a2g_jax.evaluation.summary import sample_cells
 from a2g_jax.generation.conditions import corpus_condition
 from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.metrics.beats import mel_onsets
-from a2g_jax.metrics.distribution import FrechetDistance, split_floor
 from a2g_jax.metrics.units import OURS, Units
 from a2g_jax.training.run import Run
 
@@ -54,10 +48,13 @@ class Row:
     samples: int
     """Number of motions for each clip."""
     scores: dict[str, dict[str, Any]]
-    """For each metric ``mean``, ``low``, ``high`` (95 % over clips), ``best`` (of the samples, mean over clips), and
-    for those of a feature network ``vectors`` and ``features``, their number and length."""
+    """For each metric ``mean``, ``low``, ``high`` (95 % over recordings), ``best`` (of the samples, mean over clips),
+    ``clips`` (independent recordings), and what :func:`~a2g_jax.evaluation.set_scores.set_cells` adds; None where there
+    is no value or interval, with the ``reason``."""
     emotions: dict[str, Any] | None = None
     """With a classifier of emotions: counts of clips by their own and their classified emotion."""
+    run: dict[str, Any] | None = None
+    """What a run is (:func:`~a2g_jax.evaluation.seeds.describe_run`); None for baselines."""
 
 
 def check_runs(runs: dict[str, Run], corpus: Corpus) -> None:
@@ -97,13 +94,13 @@ def evaluate(
     units: Units = OURS,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Score runs and baselines; JSON-able.
+    """Score runs and baselines; JSON-able. Runs that differ only in their seed are one row.
 
     Args:
         runs: runs by name.
         split: a split of the corpus.
         samples: motions of each run for each clip.
-        seed: seed of samples, noise and bootstrap.
+        seed: seed of samples, noise and halves of the truth.
         network: for FGD, LPIPS and the grouping of speakers; left out without one.
         judge: for emotion accuracy; left out without one.
         audit: whether to audit each run (:mod:`a2g_jax.evaluation.audit`).
@@ -134,10 +131,11 @@ def evaluate(
         )
     scorer = Scorer(corpus.space, corpus.fps, network, judge, tuple(extra_metrics), units)
     targets = [_target(corpus, scorer, segment) for segment in segments]
-    reference = np.concatenate([scorer.features(target.pose) for target in targets])
+    owners = np.array([segment.recording for segment in segments])
     speakers = [corpus.recordings[segment.recording].speaker for segment in segments]
+    reference = Reference.of([scorer.features(target.pose) for target in targets], owners.tolist(), speakers, seed)
     total, done, rows = (len(runs) + baselines * len(MOTIONS)) * len(segments), 0, []
-    for name, draw in _candidates(runs, corpus, segments, samples, seed):
+    for name, draw in candidates(runs, corpus, segments, samples, seed):
         if not baselines and name in MOTIONS and name not in runs:
             continue
         per_clip: list[list[dict[str, float]]] = []
@@ -159,11 +157,12 @@ def evaluate(
                 for pose in poses:
                     tally.add(judge.probabilities(pose), target.emotion)
         if per_clip:
-            cells = summarise(scorer, per_clip, per_group, features, reference, speakers, seed)
-            rows.append(Row(name, count, cells, None if tally is None else tally.to_json()))
-    floor = None if len(reference) < 4 else split_floor(reference, np.random.default_rng(seed))
-    if baselines and floor is not None:
-        rows.append(Row(HALVES, 1, {"fgd": halves_cell(floor, reference.shape[1])}))
+            cells = sample_cells(scorer, per_clip, per_group, owners) | set_cells(scorer, features, reference)
+            emotions = None if tally is None else tally.to_json()
+            rows.append(Row(name, count, cells, emotions, describe_run(runs[name]) if name in runs else None))
+    halves = None if network is None else halves_cell(METRICS["fgd"], reference)
+    if baselines and halves is not None:
+        rows.append(Row(HALVES, 1, {"fgd": halves}))
     about = {
         "package": __version__,
         "corpus": corpus.fingerprint,
@@ -171,6 +170,7 @@ def evaluate(
         "split": split,
         "clips": len(segments),
         "stretches": stretches,
+        "recordings": len(np.unique(owners)),
         "seconds": sum(segment.frames for segment in segments) / corpus.fps,
         "samples": samples,
         "seed": seed,
@@ -178,12 +178,13 @@ def evaluate(
         "feature_network": None if network is None else network.fingerprint,
         "emotion_classifier": None if judge is None else judge.fingerprint,
         "unit": scorer.space.unit,
-        "feature_vectors": len(reference),
+        "feature_vectors": len(reference.vectors),
         "own_features": network is None or network.run.config.corpus["fingerprint"] == corpus.fingerprint,
-        "floor": None if floor is None else floor.value,
+        "floor": None if halves is None else halves["mean"],
         "feature_width": None if network is None else network.features,
         "short_clips": short,
         "units": units.key,
+        "beat_sigma": units.beat_tolerance(corpus.fps),
         "wrist_to_wrist": scorer.wrist_to_wrist,
     }
     if judge is not None:
@@ -193,13 +194,7 @@ def evaluate(
     if extra_metrics:
         about["extra_metrics"] = describe_metrics(extra_metrics)
     audits = {name: _audit(run, corpus, scorer, segments, seed) for name, run in runs.items()} if audit else {}
-    return {"about": about, "rows": [asdict(row) for row in rows], "audits": audits}
-
-
-def halves_cell(floor: FrechetDistance, features: int) -> dict[str, Any]:
-    """The FGD of two halves of the truth, as a cell of a report."""
-    rest = {"low": None, "high": None, "best": None}
-    return {"mean": floor.value, **rest, "vectors": floor.samples, "features": features}
+    return {"about": about, "rows": group_seeds([asdict(row) for row in rows]), "audits": audits}
 
 
 def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], seed: int) -> dict[str, Any]:
@@ -243,47 +238,6 @@ def _target(corpus: Corpus, scorer: Scorer, segment: Segment) -> Target:
     onsets = mel_onsets(np.asarray(corpus.audio[segment.start : segment.stop]), corpus.fps)
     emotion = corpus.recordings[segment.recording].emotion
     return Target(pose, scorer.space.positions(pose), onsets, emotion, relevance(corpus, segment))
-
-
-_Draw = Callable[[int], list[Pose] | None]
-
-
-def _candidates(
-    runs: dict[str, Run], corpus: Corpus, segments: list[Segment], samples: int, seed: int
-) -> Iterator[tuple[str, _Draw]]:
-    """Each candidate's name, and a function from a clip to its motions (None if there are none)."""
-    for name, run in runs.items():
-        generator = Generator(run)
-
-        fields = generator.engine.model.condition_fields
-
-        def model(number: int, generator: Generator = generator, fields: tuple[str, ...] = fields) -> list[Pose]:
-            segment = segments[number]
-            audio = np.asarray(corpus.audio[segment.start : segment.stop])
-            given = corpus_condition(generator.run.config, fields, corpus, segment.start, segment.stop)
-            # A seed of its own for every clip, so that clips are independent draws.
-            return list(generator.rows(audio, samples, (seed + 7919 * (number + 1)) % 2**31, **given))
-
-        yield name, model
-    truth = lambda number: np.asarray(corpus.pose[segments[number].start : segments[number].stop])  # noqa: E731
-
-    def noise(number: int, degrees: float) -> list[Pose] | None:
-        if not corpus.space.has_rotations:
-            return None
-        rng = np.random.default_rng([seed, number])
-        return [with_noise(corpus.space, truth(number), degrees, rng)]
-
-    rows: tuple[_Draw, ...] = (
-        lambda number: [truth(number)],
-        lambda number: right_motions(corpus, segments[number], samples, seed),
-        lambda number: noise(number, 1.0),
-        lambda number: noise(number, 5.0),
-        lambda number: [nearest_neighbour(corpus, segments[number])],
-        lambda number: [other_clip(corpus, segments, number)],
-        lambda number: [first_pose(truth(number))],
-        lambda number: [mean_pose(corpus, segments[number])],
-    )
-    yield from zip(MOTIONS, rows, strict=True)
 
 
 def _fingerprint(corpus: Corpus) -> str:

@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.conditional_gaussian import ConditionalGaussian, Regression
 from a2g_jax.evaluation.evaluate import check_runs
-from a2g_jax.evaluation.likelihood_clips import Clips, clip_batches, clip_starts, scored_frames
-from a2g_jax.metrics.intervals import Interval, bootstrap_mean
+from a2g_jax.evaluation.likelihood_clips import Clips, clip_batches, clip_starts, recordings_of, scored_frames
+from a2g_jax.metrics.intervals import Interval, mean_interval
 from a2g_jax.models.base import Density
 from a2g_jax.training.run import Run, RunConfig
 
@@ -51,13 +51,15 @@ class Likelihood(NamedTuple):
     """Scored frames of each clip."""
     floor: float
     """Entropy of the noise, bits per dimension: the least that noisy poses allow; minus infinity without noise."""
+    recordings: Int[np.ndarray, " clips"]
+    """The recording of each clip, over which intervals are."""
 
 
 def bits_per_dim(run: Run, corpus: Corpus, split: str = "test", seed: int = 0) -> Likelihood:
     """Bits per dimension of a run's model.
 
     Args:
-        seed: seed of the noise and of the bootstrap.
+        seed: seed of the noise.
 
     Raises:
         InputError: a model without a likelihood, a corpus that does not fit the run, or a split without a whole clip.
@@ -89,7 +91,7 @@ def gaussian_bits_per_dim(
 
     Args:
         config: settings of the run that it is compared with.
-        seed: seed of the noise, of the bootstrap, and of the choice of training clips.
+        seed: seed of the noise and of the choice of training clips.
         most_clips: limit of training clips; a random subset where there are more.
 
     Raises:
@@ -154,7 +156,8 @@ def _likelihood(config: RunConfig, corpus: Corpus, split: str, seed: int, log_li
         return -nats.astype(np.float64).mean(axis=1) / (dimensions * math.log(2.0))
 
     noisy, clean = bits(noise), bits(0.0)
-    noisy_mean, clean_mean = (bootstrap_mean(values, np.random.default_rng(seed)) for values in (noisy, clean))
+    recordings = recordings_of(corpus, starts)
+    noisy_mean, clean_mean = (mean_interval(values, recordings) for values in (noisy, clean))
     entropy = math.log2(noise * math.sqrt(2 * math.pi * math.e)) if noise > 0 else -math.inf
     floor = entropy / density_of(config).stride
-    return Likelihood(noisy_mean, clean_mean, noisy, clean, dimensions, scored_frames(config), floor)
+    return Likelihood(noisy_mean, clean_mean, noisy, clean, dimensions, scored_frames(config), floor, recordings)

@@ -53,6 +53,11 @@ def clip_starts(config: RunConfig, corpus: Corpus, split: str) -> Int[np.ndarray
     return np.array(starts)
 
 
+def recordings_of(corpus: Corpus, rows: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Numbers of the recordings that rows of the arrays belong to."""
+    return np.searchsorted([entry.first for entry in corpus.recordings], rows, side="right") - 1
+
+
 def clip_batches(
     config: RunConfig, corpus: Corpus, starts: Int[np.ndarray, " clips"], noise: float, seed: int
 ) -> Iterator[Clips]:

@@ -2,12 +2,9 @@
 
 from typing import Any
 
-from a2g_jax.metrics.units import OURS, find_units
-
-
-def condition(about: dict[str, Any], key: str) -> Any:
-    """A condition of a report; reports of 0.1 are in our units."""
-    return about.get(key, OURS.key if key == "units" else None)
+from a2g_jax.evaluation.report_cells import condition, reasons
+from a2g_jax.metrics.intervals import LEAST
+from a2g_jax.metrics.units import find_units
 
 
 def preface(about: dict[str, Any]) -> list[str]:
@@ -21,30 +18,32 @@ def preface(about: dict[str, Any]) -> list[str]:
     ]
 
 
-def notes(about: dict[str, Any]) -> list[str]:
+def notes(result: dict[str, Any]) -> list[str]:
     """How to read the scores, with warnings."""
+    about = result["about"]
     units = find_units(condition(about, "units"))
     pairs = (
         ""
         if units.published_pairs
         else " Diversity and multimodality are means over pairs; the published sums are 0.95 of them at 20 samples."
     )
-    few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
-    if about["clips"] > about["stretches"]:
-        few = (
-            f" The clips are pieces of {about['stretches']} recording(s), which are not independent: intervals"
-            " understate the uncertainty, and do not extend to other recordings or speakers."
-        )
+    sigma = about.get("beat_sigma")
+    beats = "" if sigma is None else f" sigma is {sigma:.3f} s from motion to audio;"
     lines = [
-        "Brackets hold 95 % intervals over clips (bootstrap)." + few,
+        *_intervals(result),
         "`best` is the best of the samples of each clip, averaged over clips; it beats the mean by construction.",
-        "↓ lower is better, ↑ higher is better, ≈ nearer to the truth is better. Beat alignment has no zero: compare"
-        f" with the other rows.{pairs}",
+        f"↓ lower is better, ↑ higher is better, ≈ nearer to the truth is better. Beat alignment:{beats} it has no"
+        f" zero, compare with the other rows.{pairs}",
         *([units.describe] if units.describe else []),
         "No score here measures what people prefer.",
     ]
     if about["feature_network"] is not None:
-        floor = "" if about["floor"] is None else f" two halves of the truth are {about['floor']:.2f} apart;"
+        floor = ""
+        if about["floor"] is not None:
+            floor = (
+                f" two halves of the truth are {about['floor']:.2f} apart, the floor; beside it stands the distance of"
+                " half of a row's motion from the other half of the truth, of the same number of vectors;"
+            )
         lines.append(
             f"FGD and LPIPS use the feature network {about['feature_network'][:16]}, with {about['feature_vectors']}"
             f" vectors in a set;{floor} FGD falls with n.{too_few(about)}"
@@ -62,6 +61,30 @@ def notes(about: dict[str, Any]) -> list[str]:
     return [f"- {note}" for note in lines]
 
 
+def _intervals(result: dict[str, Any]) -> list[str]:
+    """What the brackets are, and why some are missing."""
+    about = result["about"]
+    if "recordings" not in about:  # of before 0.2
+        few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
+        return ["Brackets hold 95 % intervals over clips (percentile bootstrap)." + few]
+    lines = [
+        f"Brackets hold 95 % intervals over {about['recordings']} recordings by Student's t (emotion accuracy:"
+        " Wilson's; FGD, CHI, silhouette: jackknife). They are about these speakers. Coverage by simulation: 0.95 for"
+        " normal scores; for log-normal ones, very skewed, 0.82 with 5 recordings, 0.83 with 10, 0.91 with 50."
+    ]
+    if about["clips"] > about["recordings"]:
+        lines[0] += f" The {about['clips']} clips of a recording count together: they are not independent."
+    if any("seeds" in row for row in result["rows"]):
+        lines.append(
+            "Rows of several seeds are means over runs that differ in nothing else, with intervals over seeds by"
+            " Student's t; they hold the spread of training, not that of recordings."
+        )
+    lines += [f"A dash: {reason}." for reason in reasons(result)]
+    if about["recordings"] < LEAST and about["clips"] > about["recordings"]:
+        lines.append(f"The clips are pieces of {about['recordings']} recording(s), which are not independent.")
+    return lines
+
+
 def too_few(about: dict[str, Any]) -> str:
     """Warnings about clips without a feature vector, and about too few vectors."""
     text, vectors, width = "", about["feature_vectors"], about.get("feature_width")
@@ -70,7 +93,7 @@ def too_few(about: dict[str, Any]) -> str:
             f" **{about['short_clips']} of {about['clips']} clips are shorter than a clip of the network and are not in"
             " FGD and LPIPS.**"
         )
-    if width is not None and vectors <= width:
+    if "recordings" not in about and width is not None and vectors <= width:
         text += (
             f" **{vectors} vectors do not determine a covariance of {width} features: FGD is mostly the error of that"
             " estimate here, and only its difference from the rows of true motion means something.**"

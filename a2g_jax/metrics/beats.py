@@ -9,8 +9,19 @@ from scipy import ndimage, signal
 
 Times = Float[np.ndarray, " _"]
 
-#: Standard deviations in the papers: of the flow in frames, of BEAT in seconds.
-FLOW_SIGMA_FRAMES, BEAT_SIGMA = 5.0, 0.1
+#: Tolerance of the beat alignment from motion to audio in a report, seconds, at any frame rate.
+SIGMA = 1.0 / 6.0
+#: Tolerances of BEAT and HA2G, seconds.
+BEAT_SIGMA, WIDE_SIGMA = 0.1, 0.3
+#: The flow paper and AI Choreographer count in frames; :func:`frames_to_seconds` converts them.
+FLOW_SIGMA_FRAMES, CHOREOGRAPHER_SIGMA_FRAMES = 5.0, 3.0
+#: Standard deviation of the Gaussian over the speed in a report, seconds, at any frame rate.
+SMOOTHING = 1.0 / 15.0
+
+
+def frames_to_seconds(frames: float, fps: float) -> float:
+    """Seconds of a tolerance in frames, as in the papers' code: at the frame rate of the motion that is scored."""
+    return frames / fps
 
 
 def motion_beats(positions: Float[np.ndarray, "T J D"], fps: float, smoothing: float = 0.0) -> Times:
@@ -41,11 +52,12 @@ def beat_alignment(of: Times, to: Times, sigma: float) -> float:
     """Mean over beats of ``exp(-d^2 / (2 sigma^2))``, d the distance to the nearest of the others; 0 where one is
     empty.
 
-    The flow paper and AI Choreographer average over motion beats (``of`` motion ``to`` audio, sigma of 5 frames); HA2G
-    and BEAT over audio onsets (``of`` audio ``to`` motion, sigma of 0.1 or 0.3 s).
+    The flow paper and AI Choreographer average over motion beats (``of`` motion ``to`` audio); HA2G and BEAT over audio
+    onsets (``of`` audio ``to`` motion).
 
     Args:
-        sigma: seconds.
+        sigma: tolerance in seconds; the papers' are :data:`BEAT_SIGMA`, :data:`WIDE_SIGMA`, and
+            :data:`FLOW_SIGMA_FRAMES` and :data:`CHOREOGRAPHER_SIGMA_FRAMES` by :func:`frames_to_seconds`.
     """
     if len(of) == 0 or len(to) == 0:
         return 0.0

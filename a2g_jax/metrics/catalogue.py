@@ -1,5 +1,6 @@
 """All metrics of a report, in its order. ``docs/metrics.md`` is made from these records."""
 
+from dataclasses import replace
 from typing import Any
 
 import jax
@@ -103,8 +104,7 @@ def _mean_of_pairs(context: MotionContext, motions: Float[Array | np.ndarray, "N
 
 
 def _beat_alignment(context: MotionContext) -> float:
-    # The authors count in frames, of 15 fps.
-    return beats.beat_alignment(context.beats, context.onsets, beats.FLOW_SIGMA_FRAMES / context.fps)
+    return beats.beat_alignment(context.beats, context.onsets, context.units.beat_tolerance(context.fps))
 
 
 def _beat_alignment_audio(context: MotionContext) -> float:
@@ -154,10 +154,15 @@ def _jerk(context: MotionContext) -> float:
     return float(np.percentile(np.asarray(physical.jerk(context.wrists, context.fps)), 90))
 
 
+#: Least and greatest values of metrics that have a greatest one; others are 0 or more.
+_BOUNDS = {
+    **dict.fromkeys(("pck", "beat_alignment", "beat_alignment_audio", "srgr", "emotion_accuracy"), (0.0, 1.0)),
+    **{"speed_hellinger": (0.0, 1.0), "ssim": (-1.0, 1.0), "silhouette": (-1.0, 1.0)},
+}
 _MEAN_POSE = "Prefers the mean pose to other right motions for the same speech."
 
 METRICS: dict[str, Metric] = {
-    metric.key: metric
+    metric.key: replace(metric, bounds=_BOUNDS.get(metric.key, (0.0, float("inf"))))
     for metric in (
         Metric(
             "position L1", "cm", "lower", f"{_A2G}, Eq. 22", 2, key="position_l1", scope="pair", against_target=True,
@@ -217,11 +222,12 @@ METRICS: dict[str, Metric] = {
             function=_lpips,
         ),
         Metric(
-            "FGD", "", "lower", f"{_A2G}, Eq. 25", 2, key="fgd", scope="set",
+            "FGD", "", "lower", f"{_A2G}, Eq. 25", 2, key="fgd", distance=True, scope="set",
             measures="Fréchet distance of Gaussians through a feature network's vectors of made and recorded motion;"
             " with `--features`.",
             blind_spots="Does not look at the audio: another clip's motion, over a whole split, is the truth in another"
-            " order and scores 0. Falls with the number of vectors. Comparable only with the same feature network.",
+            " order and scores 0. Falls with the number of vectors; a dash where there are fewer than two for each"
+            " feature. Comparable only with the same feature network.",
             function=_fgd,
         ),
         Metric(
@@ -235,9 +241,10 @@ METRICS: dict[str, Metric] = {
             blind_spots="Jitter and implausible motion raise it.", function=_multimodality,
         ),
         Metric(
-            "beat alignment, motion to audio, 5 frames", "", "truth", _FLOW, key="beat_alignment",
+            "beat alignment, motion to audio", "", "truth", _FLOW, key="beat_alignment",
             measures="Mean over motion beats of `exp(-d^2 / 2 sigma^2)`, d the distance to the nearest onset of the"
-            " speech, sigma 5 frames.",
+            " speech, sigma a tolerance in seconds: 1/6 by default (`--beat-sigma`), with `--units stylized-flow` the"
+            " paper's 5 frames.",
             blind_spots="Has no zero: random beats come near the truth. A motion of few beats can score well.",
             function=_beat_alignment,
         ),
@@ -254,7 +261,7 @@ METRICS: dict[str, Metric] = {
             blind_spots="Frames without labels.", function=_srgr,
         ),
         Metric(
-            "emotion accuracy", "", "higher", "EmotionGesture", key="emotion_accuracy",
+            "emotion accuracy", "", "higher", "EmotionGesture", key="emotion_accuracy", outcome=True,
             measures="Share of clips whose own emotion a trained classifier finds most probable; with"
             " `--emotion-classifier`.",
             blind_spots="Whatever the classifier does not look at; its own errors count too.",

@@ -159,8 +159,8 @@ class MotionContext:
 
     @cached_property
     def beats(self) -> Float[np.ndarray, " n"]:
-        """Beats of the motion, seconds; speeds are smoothed over two frames."""
-        return beats.motion_beats(self.positions, self.fps, smoothing=2.0 / self.fps)
+        """Beats of the motion, seconds."""
+        return beats.motion_beats(self.positions, self.fps, beats.SMOOTHING)
 
 
 @dataclass(frozen=True, eq=False)

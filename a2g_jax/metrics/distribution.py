@@ -3,9 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int, Shaped
 
 Features = Float[np.ndarray, "_ F"]
+Rows = Int[np.ndarray, " _"]
+
+#: Fewest vectors of a Fréchet distance in a report, as a multiple of their features: each half of the truth, the floor,
+#: then still has as many vectors as features; a covariance of fewer is singular.
+LEAST_VECTORS = 2
+#: Fewest recordings whose vectors stay together when a set is halved.
+_WHOLE = 4
 
 
 class FrechetDistance(NamedTuple):
@@ -50,15 +57,56 @@ def gaussian_distance(
     return float(max(distance, 0.0))
 
 
-def split_floor(reference: Features, rng: np.random.Generator, repeats: int = 10) -> FrechetDistance:
-    """Fréchet distance of two halves of one set, mean over random halvings: the floor for that number of samples."""
-    if len(reference) < 4:
-        raise ValueError(f"expected four or more vectors to halve; got {len(reference)}")
-    half, values = len(reference) // 2, []
+def enough_vectors(vectors: int, features: int) -> bool:
+    """Whether a report shows a Fréchet distance of so many vectors."""
+    return vectors >= max(LEAST_VECTORS * features, 4)
+
+
+def halvings(owners: Shaped[np.ndarray, " n"], rng: np.random.Generator, repeats: int = 10) -> list[tuple[Rows, Rows]]:
+    """Random halves of a set, as rows, all of the same size.
+
+    Vectors of one recording stay in one half: they depend on each other, so that halves with vectors of the same
+    recordings are nearer than two sets of recordings. Where recordings are too few or too unequal for that, vectors are
+    halved one by one.
+
+    Args:
+        owners: the recording of each vector.
+
+    Raises:
+        ValueError: fewer than four vectors.
+    """
+    if len(owners) < 4:
+        raise ValueError(f"expected four or more vectors to halve; got {len(owners)}")
+    names, owner = np.unique(owners, return_inverse=True)
+    members = [np.flatnonzero(owner == one) for one in range(len(names))]
+    made = []
     for _ in range(repeats):
-        order = rng.permutation(len(reference))
-        values.append(frechet_distance(reference[order[:half]], reference[order[half : 2 * half]]).value)
-    return FrechetDistance(float(np.mean(values)), half, half)
+        halves: tuple[list[int], list[int]] = ([], [])
+        for one in rng.permutation(len(members)):
+            min(halves, key=len).extend(members[one])
+        made.append(halves)
+    half = min(len(rows) for halves in made for rows in halves)
+    if len(members) < _WHOLE or 4 * half < len(owners):
+        half = len(owners) // 2
+        orders = [rng.permutation(len(owners)) for _ in range(repeats)]
+        return [(order[:half], order[half : 2 * half]) for order in orders]
+    return [(rng.permutation(first)[:half], rng.permutation(second)[:half]) for first, second in made]
+
+
+def split_floor(
+    reference: Features,
+    rng: np.random.Generator,
+    repeats: int = 10,
+    owners: Shaped[np.ndarray, " n"] | None = None,
+) -> FrechetDistance:
+    """Fréchet distance of two halves of one set, mean over random halvings: the floor for that number of samples.
+
+    Args:
+        owners: the recording of each vector (:func:`halvings`); None if each is one of its own.
+    """
+    halves = halvings(np.arange(len(reference)) if owners is None else owners, rng, repeats)
+    values = [frechet_distance(reference[first], reference[second]).value for first, second in halves]
+    return FrechetDistance(float(np.mean(values)), len(halves[0][0]), len(halves[0][1]))
 
 
 def speed_hellinger(

@@ -41,6 +41,14 @@ class Metric:
     :class:`~a2g_jax.metrics.context.SetContext`."""
     against_target: bool = False
     """Whether it compares with the recorded motion frame by frame or window by window; a report's first table."""
+    bounds: tuple[float, float] = (float("-inf"), float("inf"))
+    """Least and greatest value; an interval does not go beyond."""
+    outcome: bool = False
+    """Whether the value is the share of clips with an outcome, such as a class: its interval is a score interval."""
+    distance: bool = False
+    """For the scope ``"set"``: whether it is a distance of made from recorded vectors through their covariances. It
+    needs :data:`~a2g_jax.metrics.distribution.LEAST_VECTORS` times as many vectors as features, and a report has that
+    of two halves of the truth beside it."""
     function: Callable[[Any], Any] | None = None
     """The value for a context; NaN or None where it is not defined."""
 

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.metrics.beats import FLOW_SIGMA_FRAMES, SIGMA, frames_to_seconds
 from a2g_jax.metrics.pointwise import REFERENCE_WRIST_TO_WRIST
 from a2g_jax.metrics.registry import Metric
 
@@ -34,6 +35,14 @@ class Units:
     eyes do not move of their own."""
     reference: float | None = None
     """Distance of the wrists in T-pose, metres, of the skeleton that lengths are scaled to (Eq. 23); None for none."""
+    beat_sigma: float = SIGMA
+    """Tolerance of the beat alignment from motion to audio, seconds."""
+    beat_sigma_frames: float | None = None
+    """That tolerance in frames, where a paper counts in frames; it takes the place of the seconds."""
+
+    def beat_tolerance(self, fps: float) -> float:
+        """Tolerance of the beat alignment from motion to audio, seconds, for motion of a frame rate."""
+        return self.beat_sigma if self.beat_sigma_frames is None else frames_to_seconds(self.beat_sigma_frames, fps)
 
     def axis_share(self, axes: int) -> float:
         """Factor from a sum over coordinates to these units."""
@@ -83,8 +92,10 @@ UNITS: dict[str, Units] = {
         ),
         Units(
             "stylized-flow",
-            "Units of the flow paper's tables: L1 distances are means over coordinates.",
+            "Units of the flow paper's tables: L1 distances are means over coordinates; the tolerance of beat alignment"
+            " is 5 frames.",
             axis_mean=True,
+            beat_sigma_frames=FLOW_SIGMA_FRAMES,
         ),
     )
 }

@@ -45,20 +45,23 @@ def save_run(folder: str | os.PathLike[str], run: Run, log: Mapping[str, Any] | 
     Args:
         log: ``bytes`` and ``sha256`` of the log of training so far.
     """
-    from safetensors.numpy import save
-
-    folder = Path(folder)
-    config = run.config
-    arrays = {f"params/{name}": value for name, value in flatten_dict(run.params, sep="/").items()}
-    arrays |= {f"summary/{name}": value for name, value in run.summary.items()}
-    for name, statistics in config.statistics.items():
-        arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
-    data = save({name: np.require(value, requirements="C") for name, value in arrays.items()})
-    values, written = run_to_json(config, run.steps), Written(hashlib.sha256(data).hexdigest(), log)
+    folder, data = Path(folder), weights_bytes(run)
+    values, written = run_to_json(run.config, run.steps), Written(hashlib.sha256(data).hexdigest(), log)
     with atomic_path(folder / WEIGHTS_FILE) as temporary:
         temporary.write_bytes(data)
         write_exchange(folder, values, written)
     write_description(folder, values, written)
+
+
+def weights_bytes(run: Run) -> bytes:
+    """The contents of a run's ``weights.safetensors``."""
+    from safetensors.numpy import save
+
+    arrays = {f"params/{name}": value for name, value in flatten_dict(run.params, sep="/").items()}
+    arrays |= {f"summary/{name}": value for name, value in run.summary.items()}
+    for name, statistics in run.config.statistics.items():
+        arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
+    return bytes(save({name: np.require(value, requirements="C") for name, value in arrays.items()}))
 
 
 def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:

@@ -102,7 +102,8 @@ def _exchanged(runs: dict[str, Any], kind: str, first: str, second: str) -> list
         if kind + keys[0] not in found:
             continue
         values = [found[kind + key] for key in keys]
-        cells = [f"{one['mean']:.2f} [{one['low']:.2f}, {one['high']:.2f}]" for one in values]
+        ends = ["-" if one["low"] is None else f"{one['low']:.2f}, {one['high']:.2f}" for one in values]
+        cells = [f"{one['mean']:.2f} [{end}]" for one, end in zip(values, ends, strict=True)]
         lines.append(f"| {name} | {found['pairs']} | {' | '.join(cells)} |")
     return lines
 

@@ -21,7 +21,7 @@ import numpy as np
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.rhythm import agreement, speed_peaks
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.objective import code_noise
@@ -105,7 +105,7 @@ def swap(run: Run, corpus: Corpus, seed: int = 0) -> dict[str, Any]:
             for name, other in zip(_FIGURES[1:], (a, b, int(rng.integers(len(clips)))), strict=True):
                 rows[name].append(agreement(found, peaks[other], SIGMA) if len(found) and len(peaks[other]) else 0.0)
         figures |= {prefix + name: values for name, values in rows.items()}
-    return {"pairs": len(pairs), **{name: bootstrap_mean(np.array(v), rng)._asdict() for name, v in figures.items()}}
+    return {"pairs": len(pairs), **{name: mean_interval(np.array(v)).to_json() for name, v in figures.items()}}
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import face
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.training.run import Run, demo_run, load_run
@@ -59,7 +59,7 @@ def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, share
         unpinned += report_pins([pin], plain, plain, limit, "", ends)
         # The same measure of recorded motion over an equally long stretch.
         recorded += report_pins([Pin("", start, clip)], own.motion, own.motion, limit, "", ends)
-    means = {name: bootstrap_mean(np.array([row[name] for row in rows]), rng)._asdict() for name in ERRORS}
+    means = {name: mean_interval(np.array([row[name] for row in rows])).to_json() for name in ERRORS}
     share = {
         f"{kind}share": np.array([row[f"{kind}error_cm"] / row[f"unpinned_{kind}error_cm"] for row in rows])
         for kind in ("", "wrist_")
@@ -68,7 +68,7 @@ def measure(run: Run, corpus: Corpus, count: int, seed: int, blend: float, share
         "pins": count,
         "speakers": min(count, len(SPEAKERS)),
         **means,
-        **{name: bootstrap_mean(values, rng)._asdict() for name, values in share.items()},
+        **{name: mean_interval(values).to_json() for name, values in share.items()},
         "followed": float(np.mean(share["share"] < FOLLOWED)),
         "wrists_followed": float(np.mean(share["wrist_share"] < FOLLOWED)),
         "seam_jerk_median": float(np.median([row["seam_jerk"] for row in rows])),

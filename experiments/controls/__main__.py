@@ -84,6 +84,7 @@ def main() -> None:
             "seconds": SECONDS,
             "draws": options.draws,
             "seed": options.seed,
+            "intervals": "Student's t",
             "gains": list(run.config.sampling_settings.control_gains),
             "judge": judge.fingerprint if judge is not None and emotions else None,
         }

@@ -48,10 +48,10 @@ def true_confusion(judge: EmotionJudge, emotions: Sequence[str]) -> dict[str, An
 
 def _summary(table: Float[np.ndarray, "K K"], correct: Float[np.ndarray, "K S"]) -> dict[str, Any]:
     """Accuracy over emotions, with its interval over speeches or speakers."""
-    from a2g_jax.metrics.intervals import bootstrap_mean
+    from a2g_jax.metrics.intervals import mean_interval
 
-    found = bootstrap_mean(correct.mean(axis=0), np.random.default_rng(0))
+    found = mean_interval(correct.mean(axis=0)).to_json()
     return {
         "table": table.tolist(),
-        "accuracy": {"mean": found.mean, "low": found.low, "high": found.high},
+        "accuracy": {"mean": found["mean"], "low": found["low"], "high": found["high"]},
     }

@@ -48,9 +48,10 @@ def _responses(axis: Axes, name: str, runs: dict[str, Any]) -> None:
     ends = [value for found in having.values() for value in found["requested"]]
     axis.plot([min(ends), max(ends)], [min(ends), max(ends)], color="0.7", linestyle="--", label="as requested")
     for colour, (run, found) in zip(_COLOURS, having.items(), strict=False):
-        means, low, high = (np.array([one[key] for one in found["arrived"]]) for key in ("mean", "low", "high"))
+        means, low, high = (np.array([one[key] for one in found["arrived"]], float) for key in ("mean", "low", "high"))
         slope = found["slope"]
-        label = f"{run}: slope {slope['mean']:.2f} [{slope['low']:.2f}, {slope['high']:.2f}]"
+        ends = "-" if slope["low"] is None else f"{slope['low']:.2f}, {slope['high']:.2f}"
+        label = f"{run}: slope {slope['mean']:.2f} [{ends}]"
         errors = [means - low, high - means]
         axis.errorbar(found["requested"], means, yerr=errors, marker="o", capsize=3, color=colour, label=label)
     axis.set_title(UNITS[name], fontsize=10)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.features.hand_properties import PROPERTIES
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from experiments.controls.subject import SECONDS, Figures, Subject, by_speech, column
 
 #: Requested quantiles; slopes are between the first and the last, at the 10th and the 90th percentile of people.
@@ -37,7 +37,6 @@ def responses(
 def _response(
     subject: Subject, name: str, free: Sequence[Figures], spread: Float[np.ndarray, " 5"], report: Callable[[], None]
 ) -> dict[str, Any]:
-    rng = np.random.default_rng(subject.seed)
     requested = np.quantile(subject.training[name], QUANTILES)
     made = []
     for quantile in QUANTILES:
@@ -50,13 +49,13 @@ def _response(
     }
     return {
         "requested": requested.tolist(),
-        "arrived": [interval(by_speech(column(one, name), subject.draws), rng) for one in made],
-        "slope": interval(change, rng),
+        "arrived": [interval(by_speech(column(one, name), subject.draws)) for one in made],
+        "slope": interval(change),
         "slope_by_draw": change.mean(axis=0).tolist(),
         "side_effects": sides,
-        "agreement": [interval(by_speech(_agreement(one), subject.draws), rng) for one in made],
-        "agreement_excess": [interval(by_speech(_excess(one), subject.draws), rng) for one in made],
-        "excess_change": [interval(by_speech(_excess(one) - _excess(free), subject.draws), rng) for one in made],
+        "agreement": [interval(by_speech(_agreement(one), subject.draws)) for one in made],
+        "agreement_excess": [interval(by_speech(_excess(one), subject.draws)) for one in made],
+        "excess_change": [interval(by_speech(_excess(one) - _excess(free), subject.draws)) for one in made],
         "jerk_p99": [_quantile_of_jerk(one, 0.99) for one in made],
         "curve": _curve(subject, name, made, report),
     }
@@ -83,7 +82,7 @@ def _curve(
     change = by_speech(np.array(high) - np.array(low), subject.draws) / (mean(7.5) - mean(15.0))
     return {
         "line": line,
-        "slope": interval(change, np.random.default_rng(subject.seed)),
+        "slope": interval(change),
         "jerk_p99": float(np.quantile(np.concatenate(jerks), 0.99)),
         "jerk_p999": float(np.quantile(np.concatenate(jerks), 0.999)),
         "constant_jerk_p99": max(_quantile_of_jerk(one, 0.99) for one in constant),
@@ -93,20 +92,19 @@ def _curve(
 
 def about(figures: Sequence[Figures], draws: int) -> dict[str, Any]:
     """Means of motions of one kind."""
-    rng = np.random.default_rng(0)
     return {
         "properties": {name: float(np.mean(column(figures, name))) for name in PROPERTIES},
-        "agreement": interval(by_speech(_agreement(figures), draws), rng),
-        "agreement_excess": interval(by_speech(_excess(figures), draws), rng),
+        "agreement": interval(by_speech(_agreement(figures), draws)),
+        "agreement_excess": interval(by_speech(_excess(figures), draws)),
         "jerk_p99": _quantile_of_jerk(figures, 0.99),
         "jerk_p999": _quantile_of_jerk(figures, 0.999),
     }
 
 
-def interval(values: Float[np.ndarray, "S draws"], rng: np.random.Generator) -> dict[str, float]:
-    """Mean, and the 95 % bootstrap over speeches, whose draws are averaged first: they are not independent."""
-    found = bootstrap_mean(values.mean(axis=1), rng)
-    return {"mean": found.mean, "low": found.low, "high": found.high}
+def interval(values: Float[np.ndarray, "S draws"]) -> dict[str, float | None]:
+    """Mean, and its 95 % interval over speeches, whose draws are averaged first: they are not independent."""
+    found = mean_interval(values.mean(axis=1)).to_json()
+    return {"mean": found["mean"], "low": found["low"], "high": found["high"]}
 
 
 def _agreement(figures: Sequence[Figures]) -> Float[np.ndarray, " N"]:

@@ -11,7 +11,7 @@ def render(figures: dict[str, Any]) -> str:
     lines = [
         "# Response to named controls",
         "",
-        "Intervals are the 95 % bootstrap over speeches.",
+        "Intervals are 95 %, over speeches.",
         "",
     ]
     for name, run in figures["runs"].items():
@@ -20,7 +20,8 @@ def render(figures: dict[str, Any]) -> str:
             f"## {name}",
             "",
             f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
-            f" {about['seconds']:g} s, {about['draws']} motions each, seeds from {about['seed']} on; gains"
+            f" {about['seconds']:g} s, {about['draws']} motions each, seeds from {about['seed']} on; intervals by"
+            f" {about.get('intervals', 'the percentile bootstrap')}; gains"
             f" {', '.join(about['gains']) or 'none'}.",
             "",
             *_slopes(run),
@@ -103,7 +104,9 @@ def _emotions(figures: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _with_interval(found: dict[str, float], digits: int = 2) -> str:
+def _with_interval(found: dict[str, Any], digits: int = 2) -> str:
+    if found["low"] is None:
+        return f"{found['mean']:.{digits}f} [-]"
     return f"{found['mean']:.{digits}f} [{found['low']:.{digits}f}, {found['high']:.{digits}f}]"
 
 

@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.evaluation.emotion_tables import EmotionTally
+from a2g_jax.evaluation.scores import METRICS
+from a2g_jax.evaluation.set_scores import Reference, set_cell
 from a2g_jax.metrics import beats, diversity, physical, pointwise
-from a2g_jax.metrics.distribution import frechet_distance
-from a2g_jax.metrics.intervals import bootstrap_mean, bootstrap_ratio
+from a2g_jax.metrics.intervals import mean_interval, share_interval
 from experiments.emotion_gesture.bench import FIRST, MADE, Bench, Made, positions
 
 #: Clips whose motions are compared with each other for diversity.
@@ -19,7 +20,6 @@ Cell = dict[str, Any]
 def scores_of(made: Made, bench: Bench, seed: int) -> dict[str, Any]:
     """``scores``, means over clips with 95 % intervals over recordings; ``emotions``, with a judge, counts of clips."""
     corpus, space = bench.corpus, bench.corpus.space
-    rng = np.random.default_rng(seed)
     places, target = positions(corpus, made), bench.places[:, None, FIRST:]
     clip_means = {
         "position_l2": space.scale * np.asarray(pointwise.position_l2(places, target)).mean(axis=1),
@@ -31,14 +31,14 @@ def scores_of(made: Made, bench: Bench, seed: int) -> dict[str, Any]:
         clip_means["mpjre"] = _rotation_error(made, bench)
     if made.shape[1] > 1:
         clip_means["multimodality"] = np.array([space.scale * diversity.mean_pair_distance(one) for one in places])
-    scores = {name: over_recordings(values, bench, rng) for name, values in clip_means.items()}
+    scores = {name: over_recordings(values, bench) for name, values in clip_means.items()}
     if len(made) > 1:
         step = max(1, len(places) // _COMPARED)
         scores["diversity"] = cell(space.scale * diversity.mean_pair_distance(places[::step, 0]))
-    scores |= _distance(made, bench) | seam(places, bench)
+    scores |= _distance(made, bench, seed) | seam(places, bench)
     if bench.ruler.judge is None:
         return {"clips": len(made), "scores": scores}
-    shown, emotions = _emotions(made, bench, rng)
+    shown, emotions = _emotions(made, bench)
     return {"clips": len(made), "scores": scores | shown, "emotions": emotions}
 
 
@@ -47,16 +47,15 @@ def cell(value: float, **more: Any) -> Cell:
     return {"mean": float(value), "low": None, "high": None, "best": None, **more}
 
 
-def over_recordings(values: Float[np.ndarray, " N"], bench: Bench, rng: np.random.Generator) -> Cell:
+def over_recordings(values: Float[np.ndarray, " N"], bench: Bench) -> Cell:
     """Mean over clips, with its interval over recordings: clips of one are not independent."""
-    means = np.array([np.nanmean(values[bench.recordings == one]) for one in np.unique(bench.recordings)])
-    found = bootstrap_mean(means, rng)
-    return {"mean": float(np.nanmean(values)), "low": found.low, "high": found.high, "best": None}
+    found = mean_interval(values, bench.recordings).to_json()
+    return {"mean": found["mean"], "low": found["low"], "high": found["high"], "best": None}
 
 
 def _beat_alignment(places: Float[np.ndarray, "N S T P _"], bench: Bench) -> Float[np.ndarray, " N"]:
     fps = bench.corpus.fps
-    sigma = beats.FLOW_SIGMA_FRAMES / fps
+    sigma = beats.frames_to_seconds(beats.FLOW_SIGMA_FRAMES, fps)
     found = [
         np.mean([beats.beat_alignment(beats.motion_beats(s, fps, smoothing=2.0 / fps), onsets, sigma) for s in clip])
         if len(onsets)
@@ -82,7 +81,7 @@ def _rotation_error(made: Made, bench: Bench) -> Float[np.ndarray, " N"]:
     return np.mean(found, axis=0)
 
 
-def _distance(made: Made, bench: Bench) -> dict[str, Cell]:
+def _distance(made: Made, bench: Bench, seed: int) -> dict[str, Cell]:
     """FGD, mean over samples, of one motion for every clip."""
     network = bench.ruler.network
     if network is None:
@@ -92,8 +91,12 @@ def _distance(made: Made, bench: Bench) -> dict[str, Cell]:
     reference = features(bench.pose[:, FIRST:])
     if len(reference) < 2:
         return {}
-    values = [frechet_distance(features(made[:, k]), reference).value for k in range(made.shape[1])]
-    return {"fgd": cell(np.mean(values), vectors=len(reference), features=reference.shape[1])}
+    # A vector counts to the recording of its middle.
+    middles = ((np.arange(len(reference)) + 0.5) * network.clip_frames).astype(int)
+    owners = np.repeat(bench.recordings, MADE)[middles]
+    truth = Reference(reference, owners, np.zeros(len(reference), int), seed)
+    found = set_cell(METRICS["fgd"], [features(made[:, k]) for k in range(made.shape[1])], truth)
+    return {} if found is None else {"fgd": {**found, "best": None}}
 
 
 def seam(places: Float[np.ndarray, "N S T P _"], bench: Bench) -> dict[str, Cell]:
@@ -116,7 +119,7 @@ def seam(places: Float[np.ndarray, "N S T P _"], bench: Bench) -> dict[str, Cell
     return scores
 
 
-def _emotions(made: Made, bench: Bench, rng: np.random.Generator) -> tuple[dict[str, Cell], dict[str, Any] | None]:
+def _emotions(made: Made, bench: Bench) -> tuple[dict[str, Cell], dict[str, Any] | None]:
     """Share of clips that the judge classifies as their own emotion, and the mean of these shares over emotions."""
     judge = bench.ruler.judge
     assert judge is not None
@@ -134,10 +137,10 @@ def _emotions(made: Made, bench: Bench, rng: np.random.Generator) -> tuple[dict[
     if not counts.any():
         return {}, None
     table, used = tally.counts, counts > 0
-    found = bootstrap_ratio(hits[used], counts[used], rng)
+    found = share_interval(hits[used], counts[used]).to_json()
     recall = np.diag(table)[table.sum(axis=1) > 0] / table.sum(axis=1)[table.sum(axis=1) > 0]
     shown = {
-        "emotion_accuracy": {"mean": found.mean, "low": found.low, "high": found.high, "best": None},
+        "emotion_accuracy": {"mean": found["mean"], "low": found["low"], "high": found["high"], "best": None},
         "emotion_balanced": cell(recall.mean(), chance=1.0 / len(recall)),
     }
     return shown, tally.to_json()

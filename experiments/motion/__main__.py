@@ -106,6 +106,7 @@ def make(options: argparse.Namespace) -> None:
         "network": network.fingerprint[:12],
         "weights": weights,
         "bench": bench.identity,
+        "intervals": "Student's t; FGD: jackknife",
         "cores": f"{os.cpu_count()} shared cores",
         "default": choose_default({row.name: rows[row.name] for row in runs}, rows),
     }

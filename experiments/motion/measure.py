@@ -85,7 +85,7 @@ class Bench:
         for number in range(len(self.speeches)):
             motions.append(row.draw(number))
             report()
-        values = statistics(self.speeches, motions, self.seed)
+        values = statistics(self.speeches, motions)
         if row.name != TRUTH:
             values = {"fgd": fgd(feature_vectors(self.network, motions), self.reference), **values}
         if row.run is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.liveliness import body_of, distance_between
 from experiments.motion.measure import kept
 from experiments.motion.rows import Row
@@ -27,9 +27,8 @@ def on_take(speech: Speech, motions: Sequence[Motion]) -> dict[str, Any]:
     values: dict[str, Any] = statistics([speech] * len(motions), [[motion] for motion in motions])
     if len(motions) > 1:
         joints, wrists = distance_between([body_of(motion) for motion in motions])
-        rng = np.random.default_rng(0)
-        values["between_joints"] = as_json(bootstrap_mean(np.array([joints]), rng))
-        values["between_wrists"] = as_json(bootstrap_mean(np.array([wrists]), rng))
+        values["between_joints"] = as_json(mean_interval(np.array([joints])))
+        values["between_wrists"] = as_json(mean_interval(np.array([wrists])))
     return {**values, "above_null": above_null(speech, motions)}
 
 

@@ -1,7 +1,7 @@
 """The statistics of the table, each with its definition.
 
-A row is a list of speeches with one or more motions each. Intervals are over speeches: the 95 % bootstrap, and for FGD
-the jackknife.
+A row is a list of speeches with one or more motions each. Intervals are over speeches, 95 % by Student's t, and for FGD
+by the jackknife.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,8 +12,8 @@ import numpy as np
 from a2g_jax.evaluation.feature_network import FeatureNetwork
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_track import represent
-from a2g_jax.metrics.distribution import Features, frechet_distance, split_floor
-from a2g_jax.metrics.intervals import Interval, bootstrap_mean
+from a2g_jax.metrics.distribution import Features, enough_vectors, frechet_distance, split_floor
+from a2g_jax.metrics.intervals import Interval, mean_interval
 from a2g_jax.metrics.liveliness import (
     Body,
     body_of,
@@ -108,38 +108,35 @@ _QUANTILES = {
 Values = dict[str, dict[str, Any]]
 
 
-def statistics(speeches: Sequence[Speech], motions: Sequence[Sequence[Motion]], seed: int = 0) -> Values:
+def statistics(speeches: Sequence[Speech], motions: Sequence[Sequence[Motion]]) -> Values:
     """Every statistic but FGD and the audit: ``value``, ``low`` and ``high``.
 
     Args:
         motions: of each speech, all at one frame rate.
     """
     bodies = [[body_of(motion) for motion in group] for group in motions]
-    rng = np.random.default_rng(seed)
     found: dict[str, Interval] = {}
     for key, (function, share) in _QUANTILES.items():
         groups = [np.concatenate([function(body).ravel() for body in group]) for group in bodies]
-        found[key] = pooled_quantile(groups, share, rng)
-    found |= _rest(speeches, bodies, rng)
+        found[key] = pooled_quantile(groups, share)
+    found |= _rest(speeches, bodies)
     for key, of_body in _OF_BODY.items():
-        found[key] = bootstrap_mean(np.array([np.mean([of_body(body) for body in group]) for group in bodies]), rng)
+        found[key] = mean_interval(np.array([np.mean([of_body(body) for body in group]) for group in bodies]))
     scores = [[speech.agreement(motion) for motion in group] for speech, group in zip(speeches, motions, strict=True)]
     for key, pick in (
         ("agreement", lambda one: one.value),
         ("agreement_null", lambda one: one.null_mean),
         ("agreement_excess", lambda one: one.value - one.null_mean),
     ):
-        found[key] = bootstrap_mean(np.array([np.mean([pick(one) for one in group]) for group in scores]), rng)
+        found[key] = mean_interval(np.array([np.mean([pick(one) for one in group]) for group in scores]))
     if min(len(group) for group in bodies) > 1:
         pairs = np.array([distance_between(group) for group in bodies])
         for number, key in enumerate(("between_joints", "between_wrists")):
-            found[key] = bootstrap_mean(pairs[:, number], rng)
+            found[key] = mean_interval(pairs[:, number])
     return {key: as_json(interval) for key, interval in found.items()}
 
 
-def _rest(
-    speeches: Sequence[Speech], bodies: Sequence[Sequence[Body]], rng: np.random.Generator
-) -> dict[str, Interval]:
+def _rest(speeches: Sequence[Speech], bodies: Sequence[Sequence[Body]]) -> dict[str, Interval]:
     """Rest, in all frames, in pauses and in speech, per cent; and the ratio of the speeds in pauses and in speech."""
     everywhere, paused, spoken, slow, fast = ([] for _ in range(5))
     for speech, group in zip(speeches, bodies, strict=True):
@@ -154,10 +151,10 @@ def _rest(
         fast.append(speed[:, loud[1:]].ravel())
     ratios = [a.mean() / max(b.mean(), 1e-9) if len(a) else np.nan for a, b in zip(slow, fast, strict=True)]
     return {
-        "rest": pooled_mean(everywhere, rng),
-        "rest_in_pauses": pooled_mean(paused, rng),
-        "rest_in_speech": pooled_mean(spoken, rng),
-        "slower_in_pauses": bootstrap_mean(np.array(ratios), rng),
+        "rest": pooled_mean(everywhere),
+        "rest_in_pauses": pooled_mean(paused),
+        "rest_in_speech": pooled_mean(spoken),
+        "slower_in_pauses": mean_interval(np.array(ratios)),
     }
 
 
@@ -190,11 +187,15 @@ def fgd(vectors: list[list[Features]], reference: list[list[Features]]) -> dict[
             )
         )
 
-    count = sum(len(group[0]) for group in reference)
+    count, width = sum(len(group[0]) for group in reference), reference[0][0].shape[1]
+    if not enough_vectors(count, width):
+        return {"value": None, "low": None, "high": None, "vectors": count}
     return {**as_json(jackknife(distance, len(reference))), "vectors": count}
 
 
 def halves(reference: list[list[Features]], seed: int) -> dict[str, Any]:
-    """FGD between random halves of the truth: the floor, for half the number of vectors."""
-    floor = split_floor(np.concatenate([group[0] for group in reference]), np.random.default_rng(seed))
+    """FGD between random halves of the truth's speeches: the floor, for half the number of vectors."""
+    vectors = [group[0] for group in reference]
+    owners = np.repeat(np.arange(len(vectors)), [len(group) for group in vectors])
+    floor = split_floor(np.concatenate(vectors), np.random.default_rng(seed), owners=owners)
     return {"value": floor.value, "low": None, "high": None, "vectors": floor.samples}

@@ -35,7 +35,7 @@ def render(about: Mapping[str, Any], rows: Rows, references: Mapping[str, Rows])
     lines += [f"- {name}: misses {', '.join(STATISTICS[key].title for key, hit in met[name].items() if not hit)}"
               for name in judged if "listening" in rows[name] and not all(met[name].values())]  # fmt: skip
     lines += ["", *_notes(rows), *_definitions(rows), ""]
-    return "\n".join(lines + _intervals(rows))
+    return "\n".join(lines + _intervals(rows, about.get("intervals", "bootstrap; FGD: jackknife")))
 
 
 def _conditions(about: Mapping[str, Any]) -> list[str]:
@@ -86,8 +86,8 @@ def _definitions(rows: Rows) -> list[str]:
     ]
 
 
-def _intervals(rows: Rows) -> list[str]:
-    lines = ["95 % intervals over speeches (bootstrap; FGD: jackknife):", "", "| | " + " | ".join(rows) + " |"]
+def _intervals(rows: Rows, kind: str) -> list[str]:
+    lines = [f"95 % intervals over speeches ({kind}):", "", "| | " + " | ".join(rows) + " |"]
     lines.append("|" + " --- |" * (len(rows) + 1))
     for key, statistic in STATISTICS.items():
         cells = [_ends(key, row.get(key)) for row in rows.values()]

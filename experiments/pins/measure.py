@@ -15,7 +15,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.metrics.hands import hand_jerk, hand_speeds, local_places
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval, share_interval
 from a2g_jax.metrics.liveliness import body_of, feet_slide
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS
@@ -86,36 +86,35 @@ def measure(
         stretch = motion.clip(max(0, pin.first - low), pin.stop + high)
         figures = {"recorded_jerk": _recorded(run, take, start, seconds, row), "turn": _turns(stretch)}
         rows.append({**row, **figures, "slide": feet_slide(body_of(stretch))})
-    return {"pins": count, "refused": refused, "rows": rows, **summary(rows, limit, np.random.default_rng(seed))}
+    return {"pins": count, "refused": refused, "rows": rows, **summary(rows, limit)}
 
 
-def summary(rows: Sequence[dict[str, Any]], limit: float, rng: np.random.Generator) -> dict[str, Any]:
+def summary(rows: Sequence[dict[str, Any]], limit: float) -> dict[str, Any]:
     """Means and shares over pins, with their 95 % intervals."""
 
     def mean(value: Callable[[dict[str, Any]], float]) -> dict[str, Any]:
-        return bootstrap_mean(np.array([float(value(row)) for row in rows]), rng)._asdict()
+        return mean_interval(np.array([float(value(row)) for row in rows])).to_json()
+
+    def share(value: Callable[[dict[str, Any]], bool], among: Sequence[dict[str, Any]] = rows) -> dict[str, Any]:
+        return share_interval(np.array([bool(value(row)) for row in among]), np.ones(len(among))).to_json()
 
     seams = [row for row in rows if row["seam_jerk"] > 0.0]
     return {
         "wrist_error_cm": mean(lambda row: row["wrist_error_cm"]),
         "unpinned_wrist_error_cm": mean(lambda row: row["unpinned_wrist_error_cm"]),
         "wrist_worst_cm": max(row["wrist_worst_cm"] for row in rows),
-        "followed": mean(lambda row: row["followed"]),
-        "rough": mean(lambda row: row["rough"]),
-        "smooth": bootstrap_mean(np.array([float(row["smooth"]) for row in seams]), rng)._asdict(),
-        "smooth_recorded": bootstrap_mean(
-            np.array([float(row["recorded_jerk"] < limit) for row in seams]), rng
-        )._asdict(),
-        "smooth_unpinned": bootstrap_mean(
-            np.array([float(row["unpinned_seam_jerk"] < limit) for row in seams]), rng
-        )._asdict(),
-        "within_speed": mean(lambda row: row["speed"] <= ROUGH_SPEED * row["top_speed"]),
-        "within_speed_of_both": mean(
+        "followed": share(lambda row: row["followed"]),
+        "rough": share(lambda row: row["rough"]),
+        "smooth": share(lambda row: row["smooth"], seams),
+        "smooth_recorded": share(lambda row: row["recorded_jerk"] < limit, seams),
+        "smooth_unpinned": share(lambda row: row["unpinned_seam_jerk"] < limit, seams),
+        "within_speed": share(lambda row: row["speed"] <= ROUGH_SPEED * row["top_speed"]),
+        "within_speed_of_both": share(
             lambda row: row["speed"] <= ROUGH_SPEED * max(row["top_speed"], row["unpinned_speed"])
         ),
-        "transition_s": bootstrap_mean(
-            np.array([value for row in rows for value in (row["before"], row["after"]) if value > 0.0]), rng
-        )._asdict(),
+        "transition_s": mean_interval(
+            np.array([value for row in rows for value in (row["before"], row["after"]) if value > 0.0])
+        ).to_json(),
         "largest_turn": max(row["turn"] for row in rows),
         "slide_mm_s": mean(lambda row: row["slide"]),
     }

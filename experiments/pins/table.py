@@ -66,4 +66,6 @@ def markdown(figures: dict[str, Any]) -> str:
 
 
 def _share(value: dict[str, Any]) -> str:
+    if value["low"] is None:
+        return f"{value['mean']:.0%} (-)".replace("%", " %")
     return f"{value['mean']:.0%} ({value['low']:.0%} to {value['high']:.0%})".replace("%", " %")

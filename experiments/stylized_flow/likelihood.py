@@ -2,7 +2,7 @@
 
     python -m experiments.stylized_flow.likelihood RUN [RUN ...] --corpus CORPUS
 
-Poses have the training's noise; test split; less is better. With 95 % intervals over clips, and of the paired
+Poses have the training's noise; test split; less is better. With 95 % intervals over recordings, and of the paired
 difference from the Gaussian. Writes ``results/likelihood.json``. Runs can be compared only where clips, history,
 lookahead and noise are the same.
 """
@@ -11,12 +11,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.likelihood import bits_per_dim, gaussian_bits_per_dim
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import difference_interval
 from a2g_jax.training.run import Run, open_run
 from experiments.tables.records import results
 
@@ -24,15 +22,15 @@ from experiments.tables.records import results
 def measure(run: Run, corpus: Corpus, seed: int) -> dict[str, Any]:
     """Bits of a run and of its Gaussian."""
     ours, gaussian = bits_per_dim(run, corpus, seed=seed), gaussian_bits_per_dim(run.config, corpus, seed=seed)
-    difference = bootstrap_mean(ours.noisy_clips - gaussian.noisy_clips, np.random.default_rng(seed))
+    difference = difference_interval(ours.noisy_clips, gaussian.noisy_clips, ours.recordings)
     return {
         "steps": run.steps,
         "settings": {"cell": run.config.model_config.cell, "predictor": run.config.model_config.predictor},
-        "noisy": ours.noisy._asdict(),
-        "clean": ours.clean._asdict(),
-        "gaussian_noisy": gaussian.noisy._asdict(),
-        "gaussian_clean": gaussian.clean._asdict(),
-        "difference_noisy": difference._asdict(),
+        "noisy": ours.noisy.to_json(),
+        "clean": ours.clean.to_json(),
+        "gaussian_noisy": gaussian.noisy.to_json(),
+        "gaussian_clean": gaussian.clean.to_json(),
+        "difference_noisy": difference.to_json(),
         "floor": ours.floor,
     }
 

@@ -7,6 +7,7 @@ lookahead. Only generated frames are scored. Every row of a table is scored on t
 history it needs itself.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,14 +17,15 @@ from jaxtyping import Float, Int
 
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.baselines import right_motions
-from a2g_jax.evaluation.evaluate import halves_cell
 from a2g_jax.evaluation.feature_network import vectors_of
-from a2g_jax.evaluation.report import HALVES
+from a2g_jax.evaluation.likelihood_clips import recordings_of
+from a2g_jax.evaluation.row_names import HALVES
+from a2g_jax.evaluation.scores import METRICS
+from a2g_jax.evaluation.set_scores import Reference, halves_cell, set_cell
 from a2g_jax.generation.continuation import continue_clips
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.metrics import beats, diversity, physical
-from a2g_jax.metrics.distribution import frechet_distance, split_floor
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.pointwise import correct_within
 from a2g_jax.training.run import Run
 from experiments.tables.runs import Ruler
@@ -87,7 +89,7 @@ def scores_of(
     starts: Int[np.ndarray, " N"],
     seed: int,
 ) -> dict[str, dict[str, Any]]:
-    """Means over clips with 95 % intervals, and the best of a clip's samples, averaged over clips."""
+    """Means over clips with 95 % intervals over recordings, and the best of a clip's samples, averaged over clips."""
     corpus, space = ruler.corpus, ruler.corpus.space
     audio, pose = clips_of(corpus, protocol, starts)
     inner = slice(protocol.first, protocol.last)
@@ -103,28 +105,36 @@ def scores_of(
         per_clip["position_l1"].append([axes * space.scale * float(d.sum(-1).mean()) for d in distance])
         per_clip["pck"].append([float((np.sqrt((d**2).sum(-1)) < near).mean()) for d in distance])
         moves = [beats.motion_beats(sample, corpus.fps, smoothing=2.0 / corpus.fps) for sample in clip]
-        sigma = beats.FLOW_SIGMA_FRAMES / corpus.fps
+        sigma = beats.frames_to_seconds(beats.FLOW_SIGMA_FRAMES, corpus.fps)
         per_clip["beat_alignment"].append([beats.beat_alignment(m, speech, sigma) for m in moves if len(speech)])
         per_clip["jerk"].append([_jerk(space, sample, corpus.fps) for sample in clip])
         speeds = [physical.speeds(space.wrists(sample), corpus.fps) for sample in clip]
         per_clip["wrist_speed"].append([float(np.mean(np.asarray(speed))) for speed in speeds])
-    rng = np.random.default_rng(seed)
-    summary = {name: _summary(name, values, rng) for name, values in per_clip.items()}
+    recordings = recordings_of(corpus, starts)
+    summary = {name: _summary(name, values, recordings) for name, values in per_clip.items()}
     if made.shape[1] > 1:
         spread = [axes * space.scale * diversity.mean_pair_distance(np.stack(clip)) for clip in places]
-        summary["multimodality"] = {**bootstrap_mean(np.array(spread), rng)._asdict(), "best": None}
+        summary["multimodality"] = {**mean_interval(np.array(spread), recordings).to_json(), "best": None}
     if len(made) > 1:
         # Between the first samples of different clips, as in the paper; not within a long motion.
         apart = axes * space.scale * diversity.mean_pair_distance(np.stack([clip[0] for clip in places]))
         summary["diversity"] = {"mean": apart, "low": None, "high": None, "best": None}
     if ruler.network is not None:
         features = lambda poses: np.concatenate([ruler.network.clip_features(one) for one in poses])  # noqa: E731
-        reference = features([one[inner] for one in pose])
-        values = [frechet_distance(features(made[:, k]), reference).value for k in range(made.shape[1])]
-        about = {"vectors": len(reference), "features": reference.shape[1]}
-        cell = {"mean": float(np.mean(values)), "low": None, "high": None, "best": float(min(values)), **about}
+        reference = _reference(ruler, [one[inner] for one in pose], recordings, seed)
+        cell = set_cell(METRICS["fgd"], [features(made[:, k]) for k in range(made.shape[1])], reference)
+        assert cell is not None
         summary["fgd"] = cell
     return summary
+
+
+def _reference(
+    ruler: Ruler, poses: Sequence[Float[np.ndarray, "T R D"]], recordings: Int[np.ndarray, " N"], seed: int
+) -> Reference:
+    """Feature vectors of the recorded frames."""
+    assert ruler.network is not None
+    vectors = [ruler.network.clip_features(one) for one in poses]
+    return Reference.of(vectors, recordings.tolist(), [""] * len(vectors), seed)
 
 
 def check_vectors(ruler: Ruler, protocol: Protocol) -> None:
@@ -142,11 +152,12 @@ def _jerk(space: PoseSpace, places: Float[np.ndarray, "T P D"], fps: float) -> f
     return float(np.percentile(np.asarray(physical.jerk(space.wrists(places), fps)), 90))
 
 
-def _summary(name: str, values: list[list[float]], rng: np.random.Generator) -> dict[str, Any]:
+def _summary(name: str, values: list[list[float]], recordings: Int[np.ndarray, " N"]) -> dict[str, Any]:
+    there = np.array([bool(row) for row in values])
     rows = [row for row in values if row]
-    interval = bootstrap_mean(np.array([np.mean(row) for row in rows]), rng)
+    interval = mean_interval(np.array([np.mean(row) for row in rows]), recordings[there])
     best = {"position_l1": np.min, "pck": np.max}.get(name)
-    return {**interval._asdict(), "best": None if best is None else float(np.mean([best(row) for row in rows]))}
+    return {**interval.to_json(), "best": None if best is None else float(np.mean([best(row) for row in rows]))}
 
 
 def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str, Any]]:
@@ -171,10 +182,8 @@ def nulls(ruler: Ruler, protocol: Protocol, seed: int = 0) -> dict[str, dict[str
         for name, made in candidates.items()
     }
     if ruler.network is not None:
-        reference = np.concatenate([ruler.network.clip_features(one) for one in inner])
-        if len(reference) >= 4:
-            floor = split_floor(reference, np.random.default_rng(seed))
-            rows[HALVES] = {"fgd": halves_cell(floor, reference.shape[1])}
+        reference = _reference(ruler, list(inner), recordings_of(ruler.corpus, starts), seed)
+        rows[HALVES] = {"fgd": halves_cell(METRICS["fgd"], reference)}
     return rows
 
 

@@ -21,7 +21,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.style import HandStyle, hand_style
 from a2g_jax.training.run import Run, open_run
 from experiments.tables.records import name_of, results
@@ -41,7 +41,6 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
     frames = round(SECONDS * corpus.fps)
     segments = [s for s in corpus.segments("test") if s.frames >= frames][:speeches]
     features = [np.asarray(corpus.audio[s.start : s.start + frames], np.float32) for s in segments]
-    rng = np.random.default_rng(seed)
     controls: dict[str, Any] = {}
     for name in names:
         rows = []
@@ -56,7 +55,7 @@ def measure(run: Run, corpus: Corpus, speeches: int, samples: int, seed: int) ->
                     "requested": float(np.percentile(training[:, column], percentile)),
                     # One value for each speech: its samples are not independent.
                     **{
-                        field: bootstrap_mean(styles[:, :, HandStyle._fields.index(field)].mean(1), rng)._asdict()
+                        field: mean_interval(styles[:, :, HandStyle._fields.index(field)].mean(1)).to_json()
                         for field in HandStyle._fields
                     },
                 }
@@ -98,7 +97,7 @@ def picture(figures: dict[str, Any], path: Path) -> None:
         requested = [row["requested"] for row in found["rows"]]
         values = [row[name] for row in found["rows"]]
         means = [value["mean"] for value in values]
-        spread = np.abs(np.array([[value["low"], value["high"]] for value in values]).T - means)
+        spread = np.abs(np.array([[value["low"], value["high"]] for value in values], float).T - means)
         axis.plot(requested, requested, color="0.7", linestyle="--", label="requested")
         axis.errorbar(requested, means, yerr=spread, marker="o", capsize=3, label="generated")
         axis.set_title(f"{name}: response {found['response']:.2f}", fontsize=10)

@@ -25,7 +25,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import write_json
-from a2g_jax.metrics.intervals import bootstrap_mean
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.rhythm import agreement_with_null
 from a2g_jax.metrics.style import HandStyle, hand_style
 from a2g_jax.talker.recordings import talk
@@ -125,9 +125,8 @@ def measure(run_name: str, corpus: Corpus, pairs: int, samples: int, seed: int) 
                     "speed": mean_style(motions).speed,
                 }
             )
-    rng = np.random.default_rng(seed)
     table = {
-        name: {key: bootstrap_mean(np.array([row[key] for row in many]), rng)._asdict() for key in many[0]}
+        name: {key: mean_interval(np.array([row[key] for row in many])).to_json() for key in many[0]}
         for name, many in rows.items()
     }
     about = {"run_steps": run.steps, "pairs": pairs, "samples": samples, "seconds": SECONDS}
@@ -149,7 +148,7 @@ def main() -> None:
         print(
             name,
             {
-                key: (round(value["mean"], 3), round(value["low"], 3), round(value["high"], 3))
+                key: tuple(None if value[end] is None else round(value[end], 3) for end in ("mean", "low", "high"))
                 for key, value in row.items()
             },
         )

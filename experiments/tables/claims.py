@@ -27,7 +27,7 @@ def best_over_seeds(table: str, variant: str, metric: str) -> float | None:
 
 
 def _has(record: Mapping[str, Any], variant: str, metric: str) -> bool:
-    return record["variant"] == variant and metric in record["scores"]
+    return record["variant"] == variant and record["scores"].get(metric, {}).get("mean") is not None
 
 
 def interval(values: Sequence[float]) -> tuple[float, float, int] | None:

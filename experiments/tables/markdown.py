@@ -153,7 +153,12 @@ def notes(table: str, found: Sequence[Mapping[str, Any]]) -> list[str]:
         lines.append(
             "These records are in our own units: L1 distances are sums over coordinates and means over our joints."
         )
-    few = [score for score in scored if score.get("vectors", float("inf")) <= score.get("features", 0)]
+    few = [
+        score
+        for score in scored
+        if score["mean"] is not None and score.get("vectors", float("inf")) <= score.get("features", 0)
+    ]
+    lines += sorted({f"A dash: {score['reason']}." for score in scored if score["mean"] is None and "reason" in score})
     if few:
         lines.append(
             f"FGD marked as of too few vectors for a covariance of {few[0]['features']} features is mostly the error of"
@@ -198,7 +203,8 @@ def _cell(table: str, variant: str, name: str, metric: Metric) -> str:
     best = best_over_seeds(table, variant, name)
     if best is not None and best != mean:
         text += f" ({best:.{digits}f})"
-    scores = next(r["scores"][name] for r in current(table) if r["variant"] == variant and name in r["scores"])
+    kept = (r["scores"][name] for r in current(table) if r["variant"] == variant and name in r["scores"])
+    scores = next(one for one in kept if one["mean"] is not None)
     return text + vectors_text(scores)
 
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from a2g_jax import __version__
+from a2g_jax.metrics.pooled import jackknife
 from a2g_jax.talker.emotions import VOICE_EMOTIONS
 from a2g_jax.talker.speakers import SPEAKERS
 
@@ -135,13 +136,10 @@ def cast_evenly(
     ]
 
 
-def bootstrap(
-    statistic: Callable[[np.ndarray], float], groups: int, seed: int, draws: int = 1000
-) -> tuple[float, float]:
-    """95 % percentile interval of a statistic of group indices, groups (recordings) drawn with replacement."""
-    rng = np.random.default_rng([seed, 32])
-    values = [statistic(rng.integers(groups, size=groups)) for _ in range(draws)]
-    return float(np.percentile(values, 2.5)), float(np.percentile(values, 97.5))
+def interval_of(statistic: Callable[[np.ndarray], float], groups: int) -> tuple[float, float]:
+    """95 % interval of a statistic of group indices over groups (recordings), by the jackknife and Student's t."""
+    found = jackknife(lambda chosen: float(statistic(np.asarray(chosen))), groups)
+    return found.low, found.high
 
 
 def wilson(correct: int, count: int) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from sklearn.preprocessing import StandardScaler
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS
 from experiments.talker import movement, sound
-from experiments.talker.common import Part, bootstrap, cast_evenly, parallel, run_part, table
+from experiments.talker.common import Part, cast_evenly, interval_of, parallel, run_part, table
 
 TARGETS = ("hand", "family", "place", "holds")
 MODELS = ("logistic", "forest")
@@ -134,7 +134,7 @@ def _task(task: tuple[str, np.ndarray, np.ndarray, np.ndarray, int], permutation
     }
 
 
-def compare(found: list[dict[str, np.ndarray]], takes: list[np.ndarray], seed: int) -> dict[str, Any]:
+def compare(found: list[dict[str, np.ndarray]], takes: list[np.ndarray]) -> dict[str, Any]:
     """All speakers' units together: accuracy, the majority's, their difference with its interval, and the null."""
     own, majority = (np.concatenate([f[name] for f in found]) for name in ("own", "majority"))
     take = np.concatenate(takes)
@@ -150,7 +150,7 @@ def compare(found: list[dict[str, np.ndarray]], takes: list[np.ndarray], seed: i
         "accuracy": accuracy,
         "majority": float(majority.mean()),
         "gain": float(gain.mean()),
-        "gain_95": bootstrap(lambda index: gains[index].sum() / counts[index].sum(), len(names), seed),
+        "gain_95": interval_of(lambda index: gains[index].sum() / counts[index].sum(), len(names)),
     }
     if null is not None:
         figures["null_mean"] = float(null.mean())
@@ -191,9 +191,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             found[index] = result
     groups = [takes[group] for group in members]
     within = {
-        "/".join(cell): compare(
-            [f for f, owner in zip(found, owners, strict=True) if owner == cell], groups, options.seed
-        )
+        "/".join(cell): compare([f for f, owner in zip(found, owners, strict=True) if owner == cell], groups)
         for cell in cells
     }
     pooled_tasks = [(name, data["audio"], column(t), takes, options.seed) for t in TARGETS for name in MODELS]
@@ -206,7 +204,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         "permutations": options.permutations,
         "choices": {t: {v: float(np.mean(column(t) == v)) for v in sorted(set(column(t)))} for t in TARGETS},
         "within_speakers": within,
-        "pooled": {name: compare([f], [takes], options.seed) for name, f in zip(names, pooled, strict=True)},
+        "pooled": {name: compare([f], [takes]) for name, f in zip(names, pooled, strict=True)},
     }
 
 

@@ -22,7 +22,7 @@ from sklearn.preprocessing import StandardScaler
 
 from a2g_jax.talker.recordings import talk
 from experiments.talker import movement, sound
-from experiments.talker.common import Part, bootstrap, cast_evenly, parallel, run_part, table
+from experiments.talker.common import Part, cast_evenly, interval_of, parallel, run_part, table
 
 FPS = 30.0
 FOLDS = 5
@@ -160,9 +160,9 @@ def judge(takes: list[dict[str, Any]], target: str, shifts: int, seed: int) -> d
             )
             null_auc.append(auc([np.roll(c, round(m * FPS)) for c, m in zip(curves[name], moved, strict=True)], labels))
         found = counts(guesses[name], strokes)
-        value["f1_95"] = bootstrap(lambda index, found=found: f1_of(found[index]), len(takes), seed)
+        value["f1_95"] = interval_of(lambda index, found=found: f1_of(found[index]), len(takes))
         pick_auc = lambda index, name=name: auc([curves[name][i] for i in index], [labels[i] for i in index])  # noqa: E731
-        value["auc_95"] = bootstrap(pick_auc, len(takes), seed, 60)
+        value["auc_95"] = interval_of(pick_auc, len(takes))
         value |= {"auc_null": float(np.mean(null_auc)), "auc_null_95": np.percentile(null_auc, (2.5, 97.5)).tolist()}
         value |= {"f1_null": float(np.mean(null_f1)), "f1_null_95": np.percentile(null_f1, (2.5, 97.5)).tolist()}
         figures[name] = value
@@ -193,7 +193,7 @@ def size_score(takes: list[dict[str, Any]], target: str, shuffles: int, seed: in
     return {
         "strokes": len(sizes),
         "r2": float(score(sizes, found)),
-        "r2_95": bootstrap(of_takes, len(takes), seed, 300),
+        "r2_95": interval_of(of_takes, len(takes)),
         "correlation": float(np.corrcoef(sizes, found)[0, 1]),
         "r2_null_95": np.percentile(null, (2.5, 97.5)).tolist() if null else None,
     }

@@ -135,9 +135,20 @@ def test_every_fgd_states_its_number_of_vectors(result):
     assert {(cell["vectors"], cell["features"]) for cell in cells.values()} == {(56, 24)}
     assert (floor["vectors"], floor["mean"]) == (28, result["about"]["floor"])
     assert floor["mean"] > 0.0 == pytest.approx(cells["truth"]["mean"], abs=1e-3)
-    assert f"{cells['mean pose']['mean']:.2f} (n = 56) |" in markdown(result)
+    for name, cell in cells.items():
+        assert (cell["floor"], cell["half_vectors"], cell["clips"]) == (floor["mean"], 28, 8), name
+        assert 0.0 <= cell["low"] <= cell["mean"] <= cell["high"], name
+    # Halves of the truth are the floor; another clip's motion, the truth in another order, is no longer perfect.
+    assert cells["truth"]["halves"] == floor["mean"]
+    assert (
+        cells["another clip's motion"]["halves"]
+        > 0.0
+        == pytest.approx(cells["another clip's motion"]["mean"], abs=1e-3)
+    )
+    text = f"(n = 56; of halves, n = 28: {cells['mean pose']['halves']:.2f}, floor {floor['mean']:.2f}) |"
+    assert text in markdown(result)
     assert "(n = 28) |" in markdown(result)
-    assert ", $n = 56$" in latex(result)
+    assert f"FGD of 56 vectors; its floor, two halves of the truth, is {floor['mean']:.2f} at 28." in latex(result)
 
 
 def with_clips_of(network, frames):
@@ -147,11 +158,26 @@ def with_clips_of(network, frames):
     return dataclasses.replace(network, run=dataclasses.replace(network.run, config=changed))
 
 
-def test_few_vectors_are_marked_and_less_than_two_are_refused(corpus, network):
+def test_few_vectors_have_no_fgd_few_recordings_no_interval_and_less_than_two_vectors_are_refused(corpus, network):
     three = dataclasses.replace(corpus, splits={**corpus.splits, "few": corpus.splits["train"][:3]})
-    text = markdown(evaluate({}, three, split="few", network=network, samples=1))
-    assert "(n = 21, too few)" in text
-    assert "**21 vectors do not determine a covariance of 24 features" in text
+    table = evaluate({}, three, split="few", network=network, samples=1)
+    assert [row["name"] for row in table["rows"]] == list(BASELINES)
+    for row in table["rows"]:
+        assert [row["scores"]["fgd"][key] for key in ("mean", "low", "high", "best")] == [None] * 4
+        if row["name"] == HALVES:
+            continue
+        cell = row["scores"]["position_l1"]
+        assert cell["mean"] >= 0.0
+        assert (cell["low"], cell["high"], cell["clips"]) == (None, None, 3)
+    json.dumps(table, allow_nan=False)
+    for text in (markdown(table), latex(table)):
+        assert "A dash: 21 feature vectors: a Fréchet distance needs 2 or more for each of the 24 features, 48." in text
+        assert "A dash: 3 recordings: an interval needs 5 or more." in text
+    held = next(row["scores"]["position_l1"]["mean"] for row in table["rows"] if row["name"] == "mean pose")
+    assert f"| {held:.2f} [-] |" in markdown(table)
+    assert f"{held:.2f} [--]" in latex(table)
+    fgd = next(line for line in markdown(table).splitlines() if line.startswith("| | samples | FGD"))
+    assert "| truth | 1 | - |" in markdown(table)[markdown(table).index(fgd) :]
     with pytest.raises(InputError, match="test split: feature vectors are of 300 frames, and in clips of at most 360"):
         evaluate({}, corpus, network=with_clips_of(network, 300), samples=1)
     assert vectors_of([100, 49, 160], 50, "here") == (5, 1)
@@ -195,12 +221,49 @@ def test_a_model_has_its_row_with_the_best_of_its_samples(corpus, toy_run_config
         check_runs({"mine": dataclasses.replace(run, config=other)}, corpus)
 
 
+def test_runs_are_described_and_those_of_several_seeds_are_one_row(corpus, toy_run_config, tmp_path, capsys):
+    """By the contents of run.json; folders' names say nothing."""
+    config = dataclasses.replace(
+        toy_run_config(), space=corpus.space, statistics=corpus.statistics, corpus={"emotions": [], "speakers": []}
+    )
+    code = np.full((4, config.model_config.code_channels), 0.7, np.float32)
+    changes = {
+        "mine": {"seed": 0},
+        "other": {"seed": 1},
+        "third": {"seed": 2},
+        "mine_seed3": {"seed": 3, "batch_size": 5},
+    }
+    for name, change in changes.items():
+        trained = dataclasses.replace(config, train_config=dataclasses.replace(config.train_config, **change))
+        params = trained.build().init(jax.random.key(change["seed"]))
+        save_run(tmp_path / name, Run(trained, params, {"specific_mean": code, "specific_std": code}, 12))
+    command = ["evaluate", *(str(tmp_path / name) for name in changes), "--corpus", str(corpus.path), "--samples", "2"]
+    assert main([*command, "--split", "train", "--out", str(tmp_path / "report")]) == 0
+    printed = capsys.readouterr().out
+    table = json.loads((tmp_path / "report" / "report.json").read_text())
+    group, alone, *_ = table["rows"]
+    assert (group["name"], group["seeds"]) == (f"{config.model} {config.preset}, seeds 0, 1, 2", 3)
+    assert alone["name"] == str(tmp_path / "mine_seed3")
+    single = [row["scores"]["position_l1"]["mean"] for row in group["runs"]]
+    cell = group["scores"]["position_l1"]
+    assert cell["mean"] == pytest.approx(np.mean(single))
+    assert cell["high"] - cell["mean"] == pytest.approx(4.3027 * np.std(single, ddof=1) / np.sqrt(3), rel=1e-4)
+    for name, row in zip(changes, [*group["runs"], alone], strict=True):
+        digest = json.loads((tmp_path / name / "run.json").read_text())["weights_sha256"]
+        assert (row["run"]["weights"], row["run"]["seed"], row["run"]["steps"]) == (digest, changes[name]["seed"], 12)
+        line = (
+            f"| {tmp_path / name} | {config.model} | {config.preset} | 12 | {changes[name]['seed']} | {digest[:16]} |"
+        )
+        assert line in printed
+        assert digest in (tmp_path / "report" / "report.tex").read_text()
+    assert "## Single runs" in printed
+
+
 def test_reports_say_what_they_are_of(result):
     text = markdown(result)
     assert "| mean pose | 1 |" in text
     assert "No score here measures" in text
     assert result["about"]["feature_network"][:16] in text
-    assert latex(result).count(r"\\") == len(result["rows"]) + 1
     json.dumps(result, allow_nan=False)
 
 
@@ -254,6 +317,12 @@ def test_the_command_writes_its_report(corpus, tmp_path, capsys):
     assert "speed L1, cm/frame ↓ | acceleration L1, cm/frame2 ↓" in printed
     assert "on a skeleton of 120.64 cm" in printed
     assert json.loads((out / "report.json").read_text())["about"]["units"] == "audio2gestures"
+    assert json.loads((out / "report.json").read_text())["about"]["beat_sigma"] == pytest.approx(1 / 6)
+    assert main([*command, "--beat-sigma", "0.3"]) == 0
+    assert "beat alignment, motion to audio, 0.3 s" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main([*command, "--beat-sigma", "5"])
+    assert "seconds from 0.01 to 2; got '5'" in capsys.readouterr().err
     assert main([*command, "--units", "feet"]) == 2
     assert "there are no 'feet'; there are: ours, audio2gestures, stylized-flow" in capsys.readouterr().err
     assert main([*command, "--split", "nothing"]) == 2

@@ -1,10 +1,10 @@
-"""Scores against labels beside scikit-learn; physics of plain motions; bootstrap intervals."""
+"""Scores against labels beside scikit-learn; physics of plain motions."""
 
 import numpy as np
 import pytest
 from sklearn import metrics as sklearn
 
-from a2g_jax.metrics import intervals, labels, physical
+from a2g_jax.metrics import labels, physical
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -52,23 +52,3 @@ def test_feet_slide_only_while_they_stand():
     assert (float(share), float(way)) == (pytest.approx(0.5), pytest.approx(0.15))
     feet[1:, 0, 1] = 0.2  # now it is in the air
     assert float(physical.foot_skate(feet, 10.0)[0]) == 0.0
-
-
-def test_intervals_hold_the_mean_about_as_often_as_they_say():
-    random = np.random.default_rng(0)
-    hits = 0
-    for _ in range(200):
-        interval = intervals.bootstrap_mean(random.normal(3.0, 1.0, 25), random, draws=400)
-        hits += interval.low <= 3.0 <= interval.high
-    assert 0.88 <= hits / 200 <= 0.98
-    assert interval.clips == 25
-
-
-def test_intervals_of_few_or_broken_clips():
-    random = np.random.default_rng(0)
-    assert intervals.bootstrap_mean(np.array([2.0]), random)[0] == 2.0
-    assert np.isnan(intervals.bootstrap_mean(np.array([2.0]), random).low)
-    assert intervals.bootstrap_mean(np.array([1.0, np.nan, 3.0]), random)[::3] == (2.0, 2)
-    assert intervals.bootstrap_mean(np.zeros(0), random).clips == 0
-    same = np.arange(10.0)
-    assert intervals.bootstrap_difference(same + 1.0, same, random)[:3] == (1.0, 1.0, 1.0)
