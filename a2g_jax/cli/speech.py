@@ -23,3 +23,12 @@ def read_speech(path: str, channel: int | None) -> "Sound":
     for finding in speech_warnings(sound):
         say(f"warning: {path}: {finding.message} {finding.fix}".rstrip())
     return sound
+
+
+def warn_of_speech(path: str, channel: int | None = None) -> None:
+    """Print the same warnings on speech that another function reads.
+
+    Raises:
+        InputError: audio that cannot be used.
+    """
+    read_speech(path, channel)

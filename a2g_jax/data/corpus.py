@@ -13,8 +13,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32, Int64
 
 from a2g_jax.data.body_json import body_from_json
-from a2g_jax.data.corpus_layout import FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
+from a2g_jax.data.corpus_layout import (
+    ANNOTATIONS,
+    FORMAT,
+    MANIFEST,
+    PARTS,
+    VERSION,
+    VERSION_ON_DEMAND,
+    WAVEFORM,
+    Entry,
+)
 from a2g_jax.data.frame_labels import label_rows, word_rows
+from a2g_jax.data.scaled_waveform import ScaledWaveform
 from a2g_jax.data.splits import Segment, Splits
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
@@ -106,6 +116,9 @@ class Corpus:
         where = self.path / MANIFEST
         if not 0 < self.fps < 10_000:
             raise InputError(f"{where}: is damaged (fps is {self.fps}); prepare the corpus anew.")
+        for entry in self.recordings:
+            if not (isinstance(entry.waveform_gain, int | float) and 0 < entry.waveform_gain < 2**200):
+                raise InputError(f"{where}: is damaged (waveform_gain is {entry.waveform_gain}); prepare it anew.")
         for name, segments in self.splits.items():
             for index, start, stop in segments:
                 if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
@@ -122,7 +135,7 @@ class Corpus:
         if samples := sum(entry.samples for entry in self.recordings):
             expected[WAVEFORM] = (np.int16, (samples,))
         for name, (kind, shape) in expected.items():
-            array = getattr(self, name.removesuffix(".npy"))
+            array = self._samples if name == WAVEFORM else getattr(self, name.removesuffix(".npy"))
             if array.shape != shape or array.dtype != kind:
                 raise InputError(
                     f"{self.path / name}: expected {np.dtype(kind)} {shape}; got {array.dtype} {array.shape}; prepare"
@@ -244,17 +257,23 @@ class Corpus:
         return StoredArray(self.path / "root.npy")
 
     @cached_property
-    def waveform(self) -> Int16[StoredArray, " samples"]:
-        """The audio itself, at ``mel.sample_rate``.
+    def _samples(self) -> Int16[StoredArray, " samples"]:
+        return StoredArray(self.path / WAVEFORM)
+
+    @cached_property
+    def waveform(self) -> "StoredArray | ScaledWaveform":
+        """The audio itself, at ``mel.sample_rate``, in units of 16-bit samples.
 
         Raises:
             InputError: the corpus does not store it.
         """
         if not any(entry.samples for entry in self.recordings):
             raise InputError(f"{self.path}: stores no waveforms; prepare it with --waveform.")
-        return StoredArray(self.path / WAVEFORM)
+        if all(entry.waveform_gain == 1.0 for entry in self.recordings):
+            return self._samples
+        return ScaledWaveform(self._samples, self.recordings)
 
-    def array(self, name: str) -> "np.ndarray | StoredArray":
+    def array(self, name: str) -> "np.ndarray | StoredArray | ScaledWaveform":
         """An array that batches are gathered from: a row a frame, and ``waveform`` with a row a sample.
 
         Args:
@@ -271,7 +290,7 @@ class Corpus:
             return self._words[("words", "word_starts").index(name)]
         if name == "waveform_start":
             return self._first_samples
-        stored: StoredArray = getattr(self, name)  # audio, pose or waveform
+        stored: StoredArray | ScaledWaveform = getattr(self, name)  # audio, pose or waveform
         return stored
 
     @cached_property
@@ -341,7 +360,7 @@ class Corpus:
 
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and other annotations of a recording; times in seconds."""
-        name = f"annotations/{recording:05d}.json"
+        name = f"{ANNOTATIONS}/{recording:05d}.json"
         expected = self.annotation_hashes[recording] if self.annotation_hashes else None
         found: dict[str, Any] = parse_json(self._bytes(name, expected), self.path / name)
         return found

@@ -10,6 +10,8 @@ from a2g_jax.errors import InputError
 
 _FULL = 65535
 _FINEST = 1e-5
+#: Peaks below the first number are played at the second.
+_QUIET, _QUIET_TO = 0.01, 0.1
 
 
 def encode_positions(points: Float[np.ndarray, "T P 3"], label: str) -> dict:
@@ -43,13 +45,32 @@ def decode_positions(encoded: dict, points: int) -> Float[np.ndarray, "T P 3"]:
     return np.asarray(encoded["low"]) + np.asarray(encoded["step"]) * numbers
 
 
+def playback_gain(audio: Float[np.ndarray, " N"]) -> float:
+    """The factor of samples on a page: 1, but less for samples beyond full scale, which would be clipped, and more for
+    those so quiet that 16 bits would hardly hold them."""
+    peak = float(np.abs(audio).max(initial=0.0))
+    if peak > 1.0:
+        return 1.0 / peak
+    return _QUIET_TO / peak if 0.0 < peak < _QUIET else 1.0
+
+
+def playback_note(audio: Float[np.ndarray, " N"]) -> str:
+    """A sentence on that factor for the reader of the page; empty for 1."""
+    gain = playback_gain(audio)
+    if gain == 1.0 or not np.isfinite(gain):
+        return ""
+    peak = float(np.abs(audio).max())
+    return f"Audio played {20 * np.log10(gain):+.1f} dB: its peak is {peak:.2g} of full scale."
+
+
 def encode_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> str:
-    """A mono 16-bit PCM WAV file in base64; samples beyond -1 to 1 are clipped."""
+    """A mono 16-bit PCM WAV file in base64, scaled by :func:`playback_gain`."""
     if sample_rate <= 0:
         raise InputError(f"audio: the sample rate is {sample_rate}; give samples per second.")
     if not np.isfinite(audio).all():
         sample = int(np.argwhere(~np.isfinite(audio))[0, 0])
         raise InputError(f"audio, sample {sample}: not a finite number; fix the audio first.")
+    audio = audio * np.float32(playback_gain(audio))
     samples = np.round(np.clip(audio, -1.0, 1.0) * 32767.0).astype("<i2").tobytes()
     form = struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, sample_rate, 2 * sample_rate, 2, 16)
     data = struct.pack("<4sI", b"data", len(samples)) + samples

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import atomic_path
 from a2g_jax.io.words import Word
-from a2g_jax.viz.player.encode import encode_audio, encode_positions
+from a2g_jax.viz.player.encode import encode_audio, encode_positions, playback_note
 from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.shape import build_shape
 from a2g_jax.viz.player.stage import placement, shape_points
@@ -98,6 +98,7 @@ def page_html(
         "lanes": [lane.encoded() for lane in lanes],
         "figures": [_figure(figure) for figure in figures],
     }
+    footer = " ".join(filter(None, (footer, playback_note(audio))))
     return fill_template(
         _template("page.html"),
         {
