@@ -7,6 +7,7 @@ from pathlib import Path
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.joint_names import named_joints
 from a2g_jax.io.files import check_readable
+from a2g_jax.io.other_formats import never_text
 
 #: Longest first: the mark of UTF-32 in little-endian order begins with that of UTF-16.
 _MARKS = (
@@ -51,7 +52,11 @@ def _decoded(path: Path, data: bytes) -> str:
         # A file cut inside of a character is reported as one that is cut short.
         text = data.decode(encoding, "replace")
     if "\0" in text[:65536]:
-        raise InputError(f"{path}: is binary, not text; expected a BVH file.")
+        zeros = len(data) - len(data.rstrip(b"\0"))
+        if zeros > 0 and b"\0" not in data[:-zeros]:
+            raise InputError(f"{path}: its last {zeros} bytes are zeros: it was not written completely; copy it again.")
+        reason = never_text(data) or "is binary, not text; expected a BVH file."
+        raise InputError(f"{path}: {reason}")
     return text
 
 
