@@ -26,8 +26,8 @@ def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
         kind: what the file should be, with its article, for the messages: ``"a BVH file"``.
 
     Raises:
-        InputError: no such file, no permission to read it, a folder or a device, an empty file, a web page, a pointer of
-            Git LFS or a packed file.
+        InputError: no such file, no permission to read it, a folder or a device, an empty file, a web page, a
+            pointer of Git LFS, or a packed file.
     """
     path = Path(path)
     try:

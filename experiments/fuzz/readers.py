@@ -43,7 +43,8 @@ def _bvh(folder: Path) -> list[bytes]:
         "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n"
         " CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
         " JOINT Spine\n {\n  OFFSET 0 10 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n"
-        "  End Site\n  {\n   OFFSET 0 10 0\n  }\n }\n}\nMOTION\nFrames: 2\nFrame Time: 0.033333\n0 90 0 1 2 3 4 5 6\n0 91 0 2 3 4 5 6 7\n"
+        "  End Site\n  {\n   OFFSET 0 10 0\n  }\n }\n}\n"
+        "MOTION\nFrames: 2\nFrame Time: 0.033333\n0 90 0 1 2 3 4 5 6\n0 91 0 2 3 4 5 6 7\n"
     )
     wide = text.replace("\n", "\r\n").encode("utf-16")
     return [text.encode(), (folder / "fingers.bvh").read_bytes(), small.encode(), wide]
