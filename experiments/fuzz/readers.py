@@ -177,7 +177,8 @@ def _pickles(_folder: Path) -> list[bytes]:
     return [pickle.dumps(show, protocol) for protocol in (0, 2, 4, 5)]
 
 
-def _read_pickle(path: Path) -> None:
+def read_pickle_file(path: Path) -> None:
+    """Read a pickle, and what was refused in it."""
     from a2g_jax.io.untrusted import check_read, read_pickle
 
     value = read_pickle(path)
@@ -345,7 +346,7 @@ READERS = (
     Reader("NPZ", "a.npz", _motions, _read_npz, change_zip),
     Reader("NPZ, inspected", "a.npz", _motions, _inspect, change_zip),
     Reader("NPY", "a.npy", _arrays, _read_array, change_bytes),
-    Reader("pickle", "a.pkl", _pickles, _read_pickle, change_bytes),
+    Reader("pickle", "a.pkl", _pickles, read_pickle_file, change_bytes),
     Reader("Arrow", "a.arrow", _arrows, _read_arrow, change_bytes),
     Reader("LMDB", "data.mdb", _databases, _read_database, change_bytes),
     Reader("HDF5", "a.h5", _hdf5, _read_hdf5, change_bytes),
