@@ -1,15 +1,17 @@
 """Arrays in HDF5 files, the format of PATS; needs the optional package h5py.
 
 HDF5 files can refer to other files (external links, external storage, virtual data sets) and to filters that the
-library loads as code. All of these are refused here before anything is read, as are sizes beyond the limits. But the C
-library parses the file's structure without a check from Python, and changed bytes can crash the process (in 2 of 4
-trials with 700 damaged files each, h5py 3.16). So read HDF5 files only from sources whose programs you would run; the
-other readers of this package need no such trust.
+library loads as code. All of these are refused here before anything is read, as are sizes beyond the limits: the
+headers of all arrays are read first. The C library parses the file's structure without a check from Python, and
+changed bytes can crash it (in 2 of 4 trials with 700 damaged files each, h5py 3.16), so it runs in a process of its
+own (:mod:`a2g_jax.io.hdf5_process`).
 """
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,8 @@ from a2g_jax.io.untrusted.budget import CONVERT, Budget, Limits, clip
 
 #: Numbers of the allowed filters: deflate, shuffle, Fletcher's checksum, and h5py's LZF.
 _FILTERS = frozenset({1, 2, 3, 32000})
+#: Memory that a file may take: this, and so much for each of its bytes.
+_LEAST, _TIMES = 2**28, 100
 #: Bytes charged for the library's bookkeeping of one chunk.
 _CHUNK = 512
 _MOST_SHOWN = 8
@@ -46,28 +50,48 @@ def read_hdf5(
         InputError: h5py is missing; no such file, not an HDF5 file, damaged, or a data set that is missing, stored
             elsewhere, of other types, packed by other filters or beyond the limits.
     """
+    from a2g_jax.io.hdf5_process import read_apart
+
     path = check_readable(path, "an HDF5 file")
-    try:
-        import h5py
-    except ImportError:
-        raise InputError(f'{path}: is read with h5py, which is missing; run pip install "a2g_jax[hdf5]".') from None
-    limits = limits or Limits()
+    if not find_spec("h5py"):
+        raise InputError(f'{path}: is read with h5py, which is missing; run pip install "a2g_jax[hdf5]".')
+    return read_apart(path, names, limits or Limits(size=min(Limits().size, _LEAST + _TIMES * path.stat().st_size)))
+
+
+def read_hdf5_here(path: Path, names: Sequence[str], limits: Limits) -> dict[str, np.ndarray]:
+    """As :func:`read_hdf5`, in this process, which a damaged file may crash.
+
+    Raises:
+        InputError: as there.
+    """
+    import h5py
+
     whole = Budget(str(path), limits)
     try:
         file = h5py.File(path, "r", locking=False)
     except _DAMAGE:
         raise InputError(f"{path}: is not an HDF5 file, or is damaged; copy or download it again.") from None
     with file:
-        result = {}
+        found, result = {}, {}
         for name in names:
-            try:
-                result[name] = _read(h5py, path, _find(h5py, path, file, name), name, whole)
-            except InputError:
-                raise
-            except _DAMAGE as error:
-                reason = " ".join(str(error).split())[:120] or type(error).__name__
-                raise InputError(f"{path}: {clip(name)} is damaged ({reason}); copy or download it again.") from None
+            with _named(path, name):
+                found[name] = _find(h5py, path, file, name)
+                _check(h5py, path, found[name], name, whole)
+        for name, place in found.items():
+            with _named(path, name):
+                result[name] = _read(h5py, path, place, name, whole)
     return result
+
+
+@contextmanager
+def _named(path: Path, name: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except _DAMAGE as error:
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise InputError(f"{path}: {clip(name)} is damaged ({reason}); copy or download it again.") from None
 
 
 def _find(h5py: Any, path: Path, file: Any, name: str) -> Any:
@@ -91,7 +115,9 @@ def _find(h5py: Any, path: Path, file: Any, name: str) -> Any:
     return place
 
 
-def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.ndarray:
+def _check(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> None:
+    """Refuse a data set by its header."""
+
     def refuse(what: str) -> InputError:
         return InputError(f"{path}: {clip(name)} {what}; {CONVERT}.")
 
@@ -118,12 +144,15 @@ def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.nd
         charge(2 * math.prod(found.chunks) * dtype.itemsize + _CHUNK * math.prod(grid))
     if size and not found.id.get_storage_size():
         raise InputError(f"{path}: {clip(name)} was never written; copy or download the file again.")
-    array = found[()]
-    if text is not None:
-        charge(8 * array.nbytes)
+
+
+def _read(h5py: Any, path: Path, found: Any, name: str, budget: Budget) -> np.ndarray:
+    array, dtype = found[()], found.dtype
+    if h5py.check_string_dtype(dtype) is not None:
+        _charger(path, name, budget)(8 * array.nbytes)
         return np.char.decode(array, "utf-8")
     array = np.array(array, dtype.newbyteorder("=").str, order="C")
-    if dtype.kind == "b" and size and array.view(np.uint8).max() > 1:
+    if dtype.kind == "b" and array.size and array.view(np.uint8).max() > 1:
         raise ValueError("a boolean is neither 0 nor 1")
     return array
 
