@@ -56,7 +56,10 @@ class ScaledWaveform:
     def __len__(self) -> int:
         return len(self._stored)
 
-    def __getitem__(self, index: slice) -> Float[np.ndarray, " n"]:
+    def __getitem__(self, index: int | slice) -> Any:
+        if not isinstance(index, slice):
+            at = range(len(self))[index]
+            return self[at : at + 1][0]
         start, stop, step = index.indices(len(self))
         values = self._stored[start:stop].astype(np.float32)
         for number in range(bisect_right(self._firsts, start) - 1, bisect_left(self._firsts, stop)):

@@ -67,14 +67,14 @@ def cached_scans(folder: Path, names: Sequence[str], what: str, scan: Any, force
         for name in names:
             path = folder / name
             before, entry = _state(path), kept.get(name)
-            same = isinstance(entry, dict) and entry.get("state") == before
-            if same and what in entry and not force:
-                found[name] = entry[what]
+            same: dict[str, Any] = entry if isinstance(entry, dict) and entry.get("state") == before else {}
+            if what in same and not force:
+                found[name] = same[what]
                 continue
             read_at = time.time()
             found[name] = scan(path)
             if before == _state(path) and read_at - max(before[1:3]) / 1e9 > _SETTLED:
-                fresh[name] = {**(entry if same else {}), "state": before, what: found[name]}
+                fresh[name] = {**same, "state": before, what: found[name]}
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path.") from None
     if fresh:

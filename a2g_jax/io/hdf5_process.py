@@ -17,6 +17,7 @@ from typing import IO, Any
 import numpy as np
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.hdf5_arrays import read_hdf5_here
 from a2g_jax.io.untrusted.budget import Limits
 
 #: Seconds for one file: 2 GB are read in less.
@@ -30,7 +31,7 @@ _running: dict[int, subprocess.Popen[bytes]] = {}
 
 
 def read_apart(path: Path, names: Sequence[str], limits: Limits) -> dict[str, np.ndarray]:
-    """The arrays of :func:`~a2g_jax.io.hdf5.read_hdf5_here`, read by the other process.
+    """The arrays of :func:`~a2g_jax.io.hdf5_arrays.read_hdf5_here`, read by the other process.
 
     Raises:
         InputError: as there; or the library crashed, or did not end.
@@ -99,8 +100,6 @@ def _end() -> None:
 
 def serve() -> None:
     """Answer requests of standard input until it ends."""
-    from a2g_jax.io.hdf5 import read_hdf5_here
-
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # nothing else may write between the answers
     for line in sys.stdin.buffer:

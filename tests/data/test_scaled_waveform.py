@@ -48,6 +48,7 @@ def test_a_corpus_gives_them_back_in_pieces(tmp_path):
         assert ("waveform_gain" in entry.to_json()) == (peak < 0.01)
     for start, stop in ((0, 10), (31990, 32010), (63999, 64001), (40000, 50000), (5, 5), (0, len(whole))):
         np.testing.assert_array_equal(corpus.waveform[start:stop] / 32768, whole[start:stop])
+    assert corpus.waveform[40000] == corpus.waveform[40000 - len(whole)] == whole[40000] * 32768
     ordinary = [prepare_recording(take, FEATURES) for take in (takes[0], takes[2])]
     assert [item.waveform_gain for item in ordinary] == [1.0, 1.0]
 
