@@ -26,7 +26,7 @@ from a2g_jax.data.corpus_layout import (
 from a2g_jax.data.frame_labels import label_rows, word_rows
 from a2g_jax.data.scaled_waveform import ScaledWaveform
 from a2g_jax.data.splits import Segment, Splits
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
@@ -80,13 +80,14 @@ class Corpus:
             raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
         if manifest.get("version") not in (VERSION, VERSION_ON_DEMAND):
             raise InputError(
-                f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION} or"
+                f"{path / MANIFEST}: has version {brief(manifest.get('version'))}; expected {VERSION} or"
                 f" {VERSION_ON_DEMAND}; prepare it anew."
             )
         kind = str(manifest.get("pose", "6d"))
         if kind not in WIDTHS:
             raise InputError(
-                f"{path / MANIFEST}: has poses of the unknown kind {kind!r}; the kinds are {', '.join(WIDTHS)}."
+                f"{path / MANIFEST}: has poses of the unknown kind {brief(repr(kind))}; the kinds are"
+                f" {', '.join(WIDTHS)}."
             )
         try:
             corpus = cls(
@@ -102,6 +103,7 @@ class Corpus:
                 hashes=manifest.get("arrays", {}),
                 annotation_hashes=tuple(manifest.get("annotations", ())),
             )
+            corpus._check_types()
             if corpus.hashes and fingerprint_of(corpus.hashes) != corpus.fingerprint:
                 raise ValueError("fingerprint and hashes disagree")
             if len(corpus.annotation_hashes) not in (0, len(corpus.recordings)):
@@ -110,6 +112,25 @@ class Corpus:
             raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
         corpus._check()
         return corpus
+
+    def _check_types(self) -> None:
+        """Check the types of values that other programs may have written.
+
+        Raises:
+            TypeError: another type.
+        """
+        for entry in self.recordings:
+            texts = (entry.name, entry.speaker, entry.emotion, entry.split)
+            numbers = (entry.first, entry.frames, entry.first_sample, entry.samples)
+            if not (all(isinstance(one, str) for one in texts) and isinstance(entry.sources, dict)):
+                raise TypeError(f"recording {brief(entry.name)}")
+            if any(type(one) is not int or one < 0 for one in numbers):
+                raise TypeError(f"frames or samples of recording {brief(entry.name)}")
+        if any(type(one) is not int for rows in self.splits.values() for row in rows for one in row):
+            raise TypeError("a split")
+        digests = (*self.hashes.values(), *self.annotation_hashes, self.fingerprint)
+        if not (isinstance(self.recipe, dict) and all(isinstance(one, str) for one in digests)):
+            raise TypeError("recipe or hashes")
 
     def _check(self) -> None:
         """Check shapes and bounds, so that nothing fails in the middle of a training."""

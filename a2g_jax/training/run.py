@@ -129,8 +129,12 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             found = extremes_from_json(values["body_extremes"], config.body_reference, where)
             config = replace(config, body_extremes=found)
         steps = int(values["steps"])
-    except InputError:
-        raise
+        if not isinstance(config.corpus, dict):
+            raise TypeError("corpus is not an object")
+    except InputError as error:
+        if str(folder) in str(error):
+            raise
+        raise InputError(f"{about}: {error}") from None
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         reason = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
         raise InputError(

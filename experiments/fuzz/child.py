@@ -15,6 +15,8 @@ CRASH, SLOW, LARGE = "crash", "over 5 s", "over 2 GB"
 OUTCOMES = (READ, REFUSED, UNNAMED, CRASH, SLOW, LARGE)
 #: Bounds of the issue: processor seconds, and bytes of memory.
 SECONDS, MEMORY = 5.0, 2 * 10**9
+#: Longest message: some name all settings.
+_LONGEST_LINE = 2500
 #: Where the process is stopped.
 _STOP_SECONDS, _STOP_MEMORY = 15, 6 * 10**9
 
@@ -70,7 +72,7 @@ def _attempt(read: Callable[[Path], Any], path: Path) -> str:
     except InputError as error:
         message = str(error)
         named = path.name in message or path.parent.name in message
-        right = named and "\n" not in message and len(message) < 900 + len(str(path))
+        right = named and "\n" not in message and len(message) < _LONGEST_LINE + len(str(path))
         return f"{REFUSED if right else UNNAMED}\n{message}"
     except BaseException as error:  # noqa: BLE001 - whatever it is, it is a finding
         frames = traceback.extract_tb(error.__traceback__)
