@@ -109,7 +109,9 @@ class Corpus:
             if len(corpus.annotation_hashes) not in (0, len(corpus.recordings)):
                 raise ValueError(f"{len(corpus.annotation_hashes)} hashes of annotations")
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
+            raise InputError(
+                f"{path / MANIFEST}: is damaged ({brief(repr(error), 160)}); prepare the corpus anew."
+            ) from None
         corpus._check()
         return corpus
 

@@ -220,3 +220,11 @@ def test_values_of_other_types_are_one_short_line(copy, change, words):
         use(copy)
     assert len(str(error.value)) < 400 + len(str(copy))
     assert "\n" not in str(error.value)
+
+
+def test_headers_of_arrays_that_no_parser_finishes_are_damage(copy):
+    data = (copy / "pose.npy").read_bytes()
+    for header in (b"{'descr': '<f4', 'shape': (((", b"{'descr': '<f4' \\", b'"""', b"(" * 100, b"\x00" * 60):
+        (copy / "pose.npy").write_bytes(data[:10] + header.ljust(118)[:117] + b"\n" + data[128:])
+        with pytest.raises(InputError, match=r"pose\.npy: cannot be read \("):
+            Corpus.open(copy)
