@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, TypeVar
 
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 
 Config = TypeVar("Config")
 
@@ -171,4 +171,4 @@ def _checked(value: Any, kind: Any, where: str) -> Any:
         return float(value)
     if typing.get_origin(kind) is None and isinstance(value, kind) and (kind is bool or not isinstance(value, bool)):
         return value
-    raise InputError(f"{where}: expected {getattr(kind, '__name__', kind)}; got {value!r}.")
+    raise InputError(f"{where}: expected {getattr(kind, '__name__', kind)}; got {brief(repr(value))}.")

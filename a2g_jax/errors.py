@@ -19,3 +19,9 @@ class OutputError(InputError):
 
 class InputWarning(UserWarning):
     """A file that can be used, with a doubt; the command line prints one as a single line and goes on."""
+
+
+def brief(value: object, longest: int = 80) -> str:
+    """A value from a file for a message: its text on one line, shortened."""
+    text = " ".join(str(value).split())
+    return text if len(text) <= longest else text[: longest - 3] + "..."

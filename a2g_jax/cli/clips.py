@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli.argument_types import number, share
 from a2g_jax.cli.paths import existing_corpus, existing_file
+from a2g_jax.cli.speech import warn_of_speech
 from a2g_jax.errors import InputError
 from a2g_jax.generation.pins.form import parse_pin
 
@@ -203,7 +204,8 @@ def _seeded(run: "Run", audio: Any, path: Path) -> Chosen:
 
     seeded = continue_clip(run, path)
     seeded.generator.check(audio)
-    return Chosen(seeded, {"label": f"continuing {path.name}"})
+    lines = [f"--seed-clip {path}: {note}" for note in seeded.notes]
+    return Chosen(seeded, {"label": f"continuing {path.name}"}, lambda out: lines)
 
 
 def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
@@ -229,6 +231,8 @@ def _styled(run: "Run", options: argparse.Namespace) -> Chosen:
 def _clip(flag: str, path: str | None, audio: str | None) -> "Clip | None":
     from a2g_jax.generation.stylized_flow.styled import Clip
 
+    if audio is not None:
+        warn_of_speech(audio)
     return None if path is None else Clip(flag, Path(path), None if audio is None else Path(audio))
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from a2g_jax.cli.argument_types import CHANNEL, TIER, VERIFY, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_file
+from a2g_jax.cli.speech import warn_of_speech
 from a2g_jax.errors import InputError
 from a2g_jax.io.reading import reading
 from a2g_jax.training.run_file import SHIPPED
@@ -84,6 +85,7 @@ def _score(options: argparse.Namespace) -> "Report":
     from a2g_jax.inspection.likelihood import file_likelihood, likelihood_report
 
     motion = Path(options.score)
+    warn_of_speech(options.audio, options.channel)
     with reading(options.channel):
         likelihood = file_likelihood(Path(options.path), motion, Path(options.audio))
     if picture is not None:

@@ -44,7 +44,7 @@ def read_words(path: str | None, tier: str | None, seconds: float) -> "tuple[Wor
 
     words, notes = transcript_notes(path, tier)
     for note in notes:
-        say(f"warning: {path}: {note}")
+        say(f"warning: {path}: {note.message} {note.fix}".rstrip())
     spoken = tuple(word for word in words if word.start < seconds)
     if words and not spoken:
         raise InputError(
@@ -52,3 +52,12 @@ def read_words(path: str | None, tier: str | None, seconds: float) -> "tuple[Wor
             " seconds, and is it the transcript of this recording?"
         )
     return spoken
+
+
+def warn_of_speech(path: str, channel: int | None = None) -> None:
+    """Print the same warnings on speech that another function reads.
+
+    Raises:
+        InputError: audio that cannot be used.
+    """
+    read_speech(path, channel)

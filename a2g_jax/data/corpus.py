@@ -13,10 +13,20 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32, Int64
 
 from a2g_jax.data.body_json import body_from_json
-from a2g_jax.data.corpus_layout import FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
+from a2g_jax.data.corpus_layout import (
+    ANNOTATIONS,
+    FORMAT,
+    MANIFEST,
+    PARTS,
+    VERSION,
+    VERSION_ON_DEMAND,
+    WAVEFORM,
+    Entry,
+)
 from a2g_jax.data.frame_labels import label_rows, word_rows
+from a2g_jax.data.scaled_waveform import ScaledWaveform
 from a2g_jax.data.splits import Segment, Splits
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
@@ -70,13 +80,14 @@ class Corpus:
             raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
         if manifest.get("version") not in (VERSION, VERSION_ON_DEMAND):
             raise InputError(
-                f"{path / MANIFEST}: has version {manifest.get('version')}; expected {VERSION} or"
+                f"{path / MANIFEST}: has version {brief(manifest.get('version'))}; expected {VERSION} or"
                 f" {VERSION_ON_DEMAND}; prepare it anew."
             )
         kind = str(manifest.get("pose", "6d"))
         if kind not in WIDTHS:
             raise InputError(
-                f"{path / MANIFEST}: has poses of the unknown kind {kind!r}; the kinds are {', '.join(WIDTHS)}."
+                f"{path / MANIFEST}: has poses of the unknown kind {brief(repr(kind))}; the kinds are"
+                f" {', '.join(WIDTHS)}."
             )
         try:
             corpus = cls(
@@ -92,20 +103,45 @@ class Corpus:
                 hashes=manifest.get("arrays", {}),
                 annotation_hashes=tuple(manifest.get("annotations", ())),
             )
+            corpus._check_types()
             if corpus.hashes and fingerprint_of(corpus.hashes) != corpus.fingerprint:
                 raise ValueError("fingerprint and hashes disagree")
             if len(corpus.annotation_hashes) not in (0, len(corpus.recordings)):
                 raise ValueError(f"{len(corpus.annotation_hashes)} hashes of annotations")
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{path / MANIFEST}: is damaged ({error!r}); prepare the corpus anew.") from None
+            raise InputError(
+                f"{path / MANIFEST}: is damaged ({brief(repr(error), 160)}); prepare the corpus anew."
+            ) from None
         corpus._check()
         return corpus
+
+    def _check_types(self) -> None:
+        """Check the types of values that other programs may have written.
+
+        Raises:
+            TypeError: another type.
+        """
+        for entry in self.recordings:
+            texts = (entry.name, entry.speaker, entry.emotion, entry.split)
+            numbers = (entry.first, entry.frames, entry.first_sample, entry.samples)
+            if not (all(isinstance(one, str) for one in texts) and isinstance(entry.sources, dict)):
+                raise TypeError(f"recording {brief(entry.name)}")
+            if any(type(one) is not int or one < 0 for one in numbers):
+                raise TypeError(f"frames or samples of recording {brief(entry.name)}")
+        if any(type(one) is not int for rows in self.splits.values() for row in rows for one in row):
+            raise TypeError("a split")
+        digests = (*self.hashes.values(), *self.annotation_hashes, self.fingerprint)
+        if not (isinstance(self.recipe, dict) and all(isinstance(one, str) for one in digests)):
+            raise TypeError("recipe or hashes")
 
     def _check(self) -> None:
         """Check shapes and bounds, so that nothing fails in the middle of a training."""
         where = self.path / MANIFEST
         if not 0 < self.fps < 10_000:
             raise InputError(f"{where}: is damaged (fps is {self.fps}); prepare the corpus anew.")
+        for entry in self.recordings:
+            if not (isinstance(entry.waveform_gain, int | float) and 0 < entry.waveform_gain < 2**200):
+                raise InputError(f"{where}: is damaged (waveform_gain is {entry.waveform_gain}); prepare it anew.")
         for name, segments in self.splits.items():
             for index, start, stop in segments:
                 if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
@@ -122,7 +158,7 @@ class Corpus:
         if samples := sum(entry.samples for entry in self.recordings):
             expected[WAVEFORM] = (np.int16, (samples,))
         for name, (kind, shape) in expected.items():
-            array = getattr(self, name.removesuffix(".npy"))
+            array = self._samples if name == WAVEFORM else getattr(self, name.removesuffix(".npy"))
             if array.shape != shape or array.dtype != kind:
                 raise InputError(
                     f"{self.path / name}: expected {np.dtype(kind)} {shape}; got {array.dtype} {array.shape}; prepare"
@@ -244,17 +280,23 @@ class Corpus:
         return StoredArray(self.path / "root.npy")
 
     @cached_property
-    def waveform(self) -> Int16[StoredArray, " samples"]:
-        """The audio itself, at ``mel.sample_rate``.
+    def _samples(self) -> Int16[StoredArray, " samples"]:
+        return StoredArray(self.path / WAVEFORM)
+
+    @cached_property
+    def waveform(self) -> "StoredArray | ScaledWaveform":
+        """The audio itself, at ``mel.sample_rate``, in units of 16-bit samples.
 
         Raises:
             InputError: the corpus does not store it.
         """
         if not any(entry.samples for entry in self.recordings):
             raise InputError(f"{self.path}: stores no waveforms; prepare it with --waveform.")
-        return StoredArray(self.path / WAVEFORM)
+        if all(entry.waveform_gain == 1.0 for entry in self.recordings):
+            return self._samples
+        return ScaledWaveform(self._samples, self.recordings)
 
-    def array(self, name: str) -> "np.ndarray | StoredArray":
+    def array(self, name: str) -> "np.ndarray | StoredArray | ScaledWaveform":
         """An array that batches are gathered from: a row a frame, and ``waveform`` with a row a sample.
 
         Args:
@@ -271,7 +313,7 @@ class Corpus:
             return self._words[("words", "word_starts").index(name)]
         if name == "waveform_start":
             return self._first_samples
-        stored: StoredArray = getattr(self, name)  # audio, pose or waveform
+        stored: StoredArray | ScaledWaveform = getattr(self, name)  # audio, pose or waveform
         return stored
 
     @cached_property
@@ -341,7 +383,7 @@ class Corpus:
 
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and other annotations of a recording; times in seconds."""
-        name = f"annotations/{recording:05d}.json"
+        name = f"{ANNOTATIONS}/{recording:05d}.json"
         expected = self.annotation_hashes[recording] if self.annotation_hashes else None
         found: dict[str, Any] = parse_json(self._bytes(name, expected), self.path / name)
         return found

@@ -2,16 +2,16 @@
 
 import hashlib
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus, differs
-from a2g_jax.data.corpus_layout import WAVEFORM
+from a2g_jax.data.corpus_layout import ANNOTATIONS, WAVEFORM
 from a2g_jax.errors import InputError
-from a2g_jax.io.hashes import cached_scan
+from a2g_jax.io.hashes import cached_scans, sha256_blocks
 from a2g_jax.io.stored_array import StoredArray
 from a2g_jax.progress import say
 
@@ -22,7 +22,7 @@ def verify_corpus(corpus: Corpus, force: bool = False) -> None:
     """Compare every file of a corpus with its hash, and look for values that are not finite.
 
     What was read once is not read again while its size and times are the same
-    (:func:`~a2g_jax.io.hashes.cached_scan`). A motion that never moves is mentioned on standard error.
+    (:func:`~a2g_jax.io.hashes.cached_scans`). A motion that never moves is mentioned on standard error.
 
     Args:
         force: read everything in any case.
@@ -30,10 +30,11 @@ def verify_corpus(corpus: Corpus, force: bool = False) -> None:
     Raises:
         InputError: the first file that differs, or the array, recording and frame of NaN or infinity.
     """
-    for message in damaged_files(corpus, force):
+    found = _scans(corpus, force)
+    for message in _damages(corpus, found):
         raise InputError(message)
     for name in _arrays(corpus):
-        row = _scanned(corpus.path / name, False)["bad row"]
+        row = found[name]["bad row"]
         if row >= 0:
             entry = corpus.recordings[bisect_right([one.first for one in corpus.recordings], row) - 1]
             raise InputError(
@@ -49,10 +50,16 @@ def damaged_files(corpus: Corpus, force: bool = False) -> Iterator[str]:
 
     Other files are compared when they are read. Corpora of version 0.1.0 have no hashes of annotations.
     """
+    yield from _damages(corpus, _scans(corpus, force))
+
+
+def _damages(corpus: Corpus, found: dict[str, dict[str, Any]]) -> Iterator[str]:
     for name in _arrays(corpus):
         expected = corpus.hashes.get(name)
-        if expected is not None and _scanned(corpus.path / name, force)["sha256"] != expected:
+        if expected is not None and found[name]["sha256"] != expected:
             yield differs(corpus.path / name)
+    if ANNOTATIONS in found and found[ANNOTATIONS]["sha256"] == _digest_of(corpus.annotation_hashes):
+        return
     for number in range(len(corpus.recordings)):
         try:
             corpus.annotations(number)
@@ -65,13 +72,24 @@ def _arrays(corpus: Corpus) -> tuple[str, ...]:
     return ("audio.npy", "pose.npy", "root.npy", *waveform)
 
 
-def _scanned(path: Path, force: bool) -> dict[str, Any]:
-    found: dict[str, Any] = cached_scan(path, "array", _scan, force)
-    return found
+def _scans(corpus: Corpus, force: bool) -> dict[str, dict[str, Any]]:
+    """What was found in the arrays, and in the folder of annotations if they have hashes, by name."""
+    folder = corpus.annotation_hashes and (corpus.path / ANNOTATIONS).is_dir()
+    names = (*_arrays(corpus), ANNOTATIONS) if folder else _arrays(corpus)
+    return cached_scans(corpus.path, names, "array", _scan, force)
+
+
+def _digest_of(hashes: Iterable[str]) -> str:
+    return hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 
 def _scan(path: Path) -> dict[str, Any]:
-    """SHA-256 of an array's file, and its first row with a value that is not finite, or -1; in one pass."""
+    """SHA-256 of an array's file, and its first row with a value that is not finite, or -1; in one pass.
+
+    Of a folder, one SHA-256 of those of its JSON files in the order of their names.
+    """
+    if path.is_dir():
+        return {"sha256": _digest_of(sha256_blocks(file) for file in sorted(path.glob("*.json")))}
     array, bad = StoredArray(path), -1
     digest = hashlib.sha256()
     with path.open("rb") as file:

@@ -1,6 +1,7 @@
 """The files of a corpus folder, and the entry of a recording in its manifest."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 FORMAT = "a2g_jax corpus"
 #: Versions of corpora that store all recordings, and of those that generate most of them in training.
@@ -10,6 +11,8 @@ MANIFEST = "manifest.json"
 PARTS = "parts.json"
 #: The arrays of a corpus, all recordings one after the other: log-mel (N, width), poses (N, R, D), root (N, 3).
 ARRAYS = ("audio.npy", "pose.npy", "root.npy")
+#: Folder of a JSON file for each recording: its words, and what else is known of it.
+ANNOTATIONS = "annotations"
 #: The audio itself, where it is stored: 16-bit samples, as many for each recording as its frames last.
 WAVEFORM = "waveform.npy"
 
@@ -32,3 +35,10 @@ class Entry:
     """Row of its first sample in the waveform."""
     samples: int = 0
     """Number of samples; 0 where the corpus stores no audio."""
+    waveform_gain: float = 1.0
+    """What its stored samples were multiplied by (:mod:`a2g_jax.data.scaled_waveform`)."""
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry as JSON values, without a gain of 1."""
+        values = asdict(self)
+        return {name: value for name, value in values.items() if name != "waveform_gain" or value != 1.0}

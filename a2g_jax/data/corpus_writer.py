@@ -251,7 +251,7 @@ def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], No
         **features.to_json(),
         "seconds": work.frames / features.fps,
         **body_to_json(body),
-        "recordings": [asdict(entry) for entry in entries],
+        "recordings": [entry.to_json() for entry in entries],
         "splits": {name: [list(segment) for segment in segments] for name, segments in splits.items()},
         "arrays": hashes,
         "annotations": work.annotation_hashes,

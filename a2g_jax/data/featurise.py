@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int16
 
 from a2g_jax.data.datasets.cut import cut
+from a2g_jax.data.scaled_waveform import scaled_waveform
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import log_mel
@@ -44,6 +45,8 @@ class Prepared:
     annotations: dict[str, Any]
     notes: tuple[str, ...] = ()
     """What the user should know of it, a sentence each."""
+    waveform_gain: float = 1.0
+    """What the samples of the waveform were multiplied by."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +108,16 @@ def prepare_recording(
         motion = resample(moved, fps, frames)
         root = np.asarray(motion.root, np.float32)
     pose, body = represent(motion, features.pose, where)
+    waveform, gain = None, 1.0
+    if features.waveform:
+        waveform, gain = scaled_waveform(recording.audio, round(frames * mel.sample_rate / fps))
     return Prepared(
         name=recording.name,
         audio=log_mel(recording.audio, mel, fps, frames),
         pose=pose,
         root=root,
-        waveform=_waveform(recording.audio, round(frames * mel.sample_rate / fps)) if features.waveform else None,
+        waveform=waveform,
+        waveform_gain=gain,
         body=body,
         speaker=recording.speaker,
         emotion=recording.emotion,
@@ -167,10 +174,3 @@ def choose_joints(motion: Motion, joints: str, where: str, whole: Motion | None 
         raise InputError(f"{error} Or use --joints all, which keeps the rig as it is.") from None
     target = body_skeleton(rig) if joints == "body" else upper_body_rig(rig)
     return retarget(motion, target, source=rig)
-
-
-def _waveform(audio: Float[np.ndarray, " N"], samples: int) -> Int16[np.ndarray, " n"]:
-    """16-bit samples, padded with silence."""
-    whole = np.zeros(samples, np.float32)
-    whole[: len(audio)] = audio[:samples]
-    return np.rint(np.clip(whole, -1.0, 1.0) * 32767.0).astype(np.int16)

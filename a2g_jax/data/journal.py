@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from a2g_jax.data.body_json import body_from_json, body_to_json
-from a2g_jax.data.corpus_layout import ARRAYS, WAVEFORM, Entry
+from a2g_jax.data.corpus_layout import ANNOTATIONS, ARRAYS, WAVEFORM, Entry
 from a2g_jax.data.featurise import Prepared, Skipped
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
@@ -68,7 +68,7 @@ class Unfinished:
         Args:
             sources: name and files of every recording of the corpus.
         """
-        make_folder(self.corpus / "annotations")
+        make_folder(self.corpus / ANNOTATIONS)
         lines = self._journal_lines()
         valid = 0
         for line, (name, files) in zip(lines, sources, strict=False):
@@ -103,10 +103,11 @@ class Unfinished:
             item.split,
             self._samples,
             0 if item.waveform is None else len(item.waveform),
+            item.waveform_gain,
         )
         digest = sha256_file(annotations)
         value = {
-            "entry": asdict(entry),
+            "entry": entry.to_json(),
             "rows": hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest(),
             "annotations": digest,
             "spread": self.spread,
@@ -230,7 +231,7 @@ class Unfinished:
             else:
                 os.truncate(path, _HEADER_BYTES + self._count(name) * self._row_bytes(name))
         keep = {self._annotations(number).name for number in range(len(self.entries))}
-        for path in (self.corpus / "annotations").iterdir():
+        for path in (self.corpus / ANNOTATIONS).iterdir():
             if path.name not in keep:
                 path.unlink()
 
@@ -264,7 +265,7 @@ class Unfinished:
         return np.dtype(_kind(name)).itemsize * int(np.prod(self._row_shape(name)))
 
     def _annotations(self, number: int) -> Path:
-        return self.corpus / "annotations" / f"{number:05d}.json"
+        return self.corpus / ANNOTATIONS / f"{number:05d}.json"
 
 
 def _kind(name: str) -> type[np.generic]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy import fft
 
 #: Seconds of a window, and of the shortest recording that is judged.
 WINDOW, SHORTEST = 4.0, 1.5
@@ -104,7 +105,7 @@ def _spectra(
     size, hop = round(seconds * sample_rate), round(_HOP * sample_rate)
     padded = np.pad(audio, size // 2)
     windows = np.lib.stride_tricks.sliding_window_view(padded, size)[::hop] * np.hanning(size).astype(np.float32)
-    spectrum = np.fft.rfft(windows, axis=1)
+    spectrum = fft.rfft(windows, axis=1)  # in single precision, several times as fast as NumPy's
     return spectrum.real**2 + spectrum.imag**2, np.fft.rfftfreq(size, 1 / sample_rate)
 
 

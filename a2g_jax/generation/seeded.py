@@ -25,6 +25,8 @@ class Seeded:
 
     generator: Generator
     seed_poses: Float[np.ndarray, "S R D"]
+    notes: tuple[str, ...] = ()
+    """What was left out of the clip, for the user."""
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -55,10 +57,14 @@ def continue_clip(run: Run, path: Path) -> Seeded:
     needed, config = generator.engine.model.seed_frames, run.config
     if needed == 0:
         raise InputError(f"--seed-clip: runs of {config.model} take no seed poses.")
-    motion = read_facing(path, run)
+    motion, notes = read_facing(path, run)
     if motion.frames < needed:
         raise InputError(
             f"--seed-clip {path}: has {motion.frames} frames at the run's {motion.fps:g} fps; give a clip of"
-            f" {needed} or more."
+            f" {needed} or more{_after(notes)}."
         )
-    return Seeded(generator, represent(motion, config.space.kind, str(path))[0][-needed:])
+    return Seeded(generator, represent(motion, config.space.kind, str(path))[0][-needed:], notes)
+
+
+def _after(notes: tuple[str, ...]) -> str:
+    return f" ({notes[0]})" if notes else ""

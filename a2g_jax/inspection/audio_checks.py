@@ -1,5 +1,7 @@
 """Faults of a speech recording alone: clipping, silence, no speech, a constant offset, too low a level, channels."""
 
+from functools import cached_property
+
 import numpy as np
 from jaxtyping import Float
 
@@ -31,34 +33,68 @@ def peak_db(audio: Float[np.ndarray, " N"]) -> float:
 
 def clipped_share(audio: Float[np.ndarray, " N"]) -> tuple[float, int]:
     """Share of samples that lie in flat peaks, and the first such sample."""
-    size = np.abs(audio)
-    flat = size >= (1 - CLIPPED_WITHIN) * size.max(initial=1e-9)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flat, [False]]).astype(np.int8))).reshape(-1, 2)
-    runs = edges[edges[:, 1] - edges[:, 0] >= CLIPPED_RUN]
-    if len(runs) == 0:
+    least = (1 - CLIPPED_WITHIN) * max(audio.max(initial=1e-9), -audio.min(initial=0.0))
+    flat = np.flatnonzero((audio >= least) | (audio <= -least))
+    if len(flat) == 0:
         return 0.0, 0
-    return float((runs[:, 1] - runs[:, 0]).sum() / len(audio)), int(runs[0, 0])
+    breaks = np.flatnonzero(np.diff(flat) > 1) + 1
+    firsts = np.concatenate([[0], breaks])
+    lengths = np.diff(np.concatenate([firsts, [len(flat)]]))
+    runs = lengths >= CLIPPED_RUN
+    if not runs.any():
+        return 0.0, 0
+    return float(lengths[runs].sum() / len(audio)), int(flat[firsts[runs][0]])
 
 
-def check_clipping(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+class Speech:
+    """The samples of a recording, and what is measured of them once.
+
+    Args:
+        audio: (N,) samples.
+        sample_rate: Hz.
+        centred: the same without a constant offset, where they are computed already.
+    """
+
+    def __init__(
+        self, audio: Float[np.ndarray, " N"], sample_rate: int, centred: Float[np.ndarray, " N"] | None = None
+    ) -> None:
+        self.audio, self.sample_rate = audio, sample_rate
+        self.centred = without_offset(audio, sample_rate) if centred is None else centred
+
+    @cached_property
+    def level(self) -> float:
+        """Level of active speech, dB of full scale, without the offset."""
+        return active_level_db(self.centred, self.sample_rate)
+
+    @cached_property
+    def level_with_offset(self) -> float:
+        """The same of the samples as they are."""
+        return self.level if self.centred is self.audio else active_level_db(self.audio, self.sample_rate)
+
+    @cached_property
+    def clipped(self) -> tuple[float, int]:
+        """As :func:`clipped_share`."""
+        return clipped_share(self.audio)
+
+
+def check_clipping(speech: Speech) -> list[Finding]:
     """Peaks cut off at the limit of the recorder or of a later step."""
-    share, first = clipped_share(audio)
+    share, first = speech.clipped
     if share < CLIPPED_SHARE:
         return []
-    message = f"{100 * share:.2f} % of the samples are clipped at {peak_db(audio):.1f} dB of full scale."
+    message = f"{100 * share:.2f} % of the samples are clipped at {peak_db(speech.audio):.1f} dB of full scale."
     fix = "Record at a lower level, or use the original before it was amplified."
-    return [Finding("warning", "clipping", message, fix, Place(seconds=first / sample_rate), share)]
+    return [Finding("warning", "clipping", message, fix, Place(seconds=first / speech.sample_rate), share)]
 
 
-def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+def check_silence(speech: Speech) -> list[Finding]:
     """Long stretches far below the level of speech."""
-    audio = without_offset(audio, sample_rate)
-    size = int(_BLOCK * sample_rate)
+    audio, size = speech.centred, int(_BLOCK * speech.sample_rate)
     count = len(audio) // size
     if count == 0:
         return []
     power = np.mean(np.square(audio[: count * size].reshape(count, size), dtype=np.float64), axis=1)
-    quiet = 10 * np.log10(power + 1e-12) < active_level_db(audio, sample_rate) - SILENT_BELOW
+    quiet = 10 * np.log10(power + 1e-12) < speech.level - SILENT_BELOW
     edges = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8))).reshape(-1, 2)
     findings = []
     for start, stop in edges[edges[:, 1] - edges[:, 0] >= SILENT_SECONDS / _BLOCK]:
@@ -69,12 +105,11 @@ def check_silence(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Find
     return findings
 
 
-def check_level(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+def check_level(speech: Speech) -> list[Finding]:
     """A constant offset of the samples, which is removed before features are computed, and speech that is too faint."""
-    offset = sample_offset(audio, sample_rate)
-    level = active_level_db(without_offset(audio, sample_rate), sample_rate)
-    findings = []
-    if offset != 0.0:
+    level, findings = speech.level, []
+    if speech.centred is not speech.audio:
+        offset = sample_offset(speech.audio, speech.sample_rate)
         message = f"the samples are off zero by {offset:.4f} on average; the offset is removed when they are read."
         findings.append(Finding("info", "dc", message, value=abs(offset)))
     if level < FAINT:
@@ -83,26 +118,30 @@ def check_level(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Findin
     return findings
 
 
-def check_speech(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+def check_speech(speech: Speech) -> list[Finding]:
     """Whether there is speech at all."""
-    reason = why_no_speech(audio, sample_rate)
+    reason = why_no_speech(speech.audio, speech.sample_rate)
     fix = "Name a recording of speech; motion follows whatever sound there is."
     return [Finding("warning", "no-speech", f"no speech is found: {reason}.", fix)] if reason else []
 
 
-def check_audio(audio: Float[np.ndarray, " N"], sample_rate: int) -> list[Finding]:
+def check_audio(speech: Speech) -> list[Finding]:
     """All checks of the samples of a speech recording alone."""
-    return [
-        *check_clipping(audio, sample_rate),
-        *check_silence(audio, sample_rate),
-        *check_level(audio, sample_rate),
-        *check_speech(audio, sample_rate),
-    ]
+    return [*check_clipping(speech), *check_silence(speech), *check_level(speech), *check_speech(speech)]
 
 
-def check_sound(sound: Sound) -> list[Finding]:
-    """All checks of an audio file: header, channels and samples."""
-    return [*map(finding_of, sound.notes()), *check_audio(sound.samples, sound.info.sample_rate)]
+def speech_of(sound: Sound) -> Speech:
+    """The samples of an audio file."""
+    return Speech(sound.samples, sound.info.sample_rate, sound.centred)
+
+
+def check_sound(sound: Sound, speech: Speech | None = None) -> list[Finding]:
+    """All checks of an audio file: header, channels and samples.
+
+    Args:
+        speech: its samples, where something of them has been measured.
+    """
+    return [*map(finding_of, sound.notes()), *check_audio(speech or speech_of(sound))]
 
 
 def speech_warnings(sound: Sound) -> list[Finding]:

@@ -120,6 +120,9 @@ def check_layout(layout: Layout) -> list[Finding]:
     if not unit.plain:
         fix = "" if unit.usual else "If you know it, name it when reading (scale of read_bvh)."
         findings.append(Finding("info" if unit.usual else "warning", "unit", f"{unit}.", fix, value=unit.metres))
+    if layout.root_doubt:
+        fix = "Multiply the root's positions, or export the file again."
+        findings.append(Finding("warning", "root-unit", f"{layout.root_doubt}.", fix))
     if layout.carrier:
         name = layout.joints[layout.carrier].name
         message = f"the path of the body is in the position channels of {name}; it is read as that of the root above."

@@ -13,7 +13,7 @@ from a2g_jax.data.corpus_integrity import damaged_files
 from a2g_jax.data.corpus_layout import Entry
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
-from a2g_jax.inspection.audio_checks import check_audio
+from a2g_jax.inspection.audio_checks import Speech, check_audio
 from a2g_jax.inspection.copies import Fingerprint, bands_fingerprint, check_copies, poses_fingerprint
 from a2g_jax.inspection.describe import try_rig
 from a2g_jax.inspection.finding import Finding, Place, located
@@ -58,7 +58,7 @@ def inspect_corpus(path: Path, verify: bool = False) -> Report:
                     faults += check_offset(offset)
             if entry.samples:
                 samples = corpus.waveform[entry.first_sample : entry.first_sample + entry.samples]
-                faults += check_audio(samples.astype(np.float32) / 32768, corpus.mel.sample_rate)
+                faults += check_audio(Speech(samples.astype(np.float32) / 32768, corpus.mel.sample_rate))
             findings += located(faults, recording=entry.name)
             bar.update()
     names, parts = [entry.name for entry in corpus.recordings], _splits_of(corpus)

@@ -6,12 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import active_level_db
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.match_table import missing_parts
 from a2g_jax.geometry.retarget.poses import joint_places, rotation_angle, world_rotations
 from a2g_jax.geometry.retarget.rig import Rig, find_rig
-from a2g_jax.inspection.audio_checks import clipped_share, peak_db
+from a2g_jax.inspection.audio_checks import Speech, peak_db
 from a2g_jax.inspection.finding import Finding
 from a2g_jax.inspection.motion_checks import rotation_steps
 from a2g_jax.io.words import Word
@@ -75,14 +74,14 @@ def motion_facts(
     return facts
 
 
-def audio_facts(audio: Float[np.ndarray, " N"], sample_rate: int) -> dict[str, Any]:
+def audio_facts(speech: Speech) -> dict[str, Any]:
     """Length and level."""
     return {
-        "seconds": round(len(audio) / sample_rate, 3),
-        "active level (dBFS)": round(active_level_db(audio, sample_rate), 1),
-        "peak (dBFS)": round(peak_db(audio), 1),
-        "clipped share": round(clipped_share(audio)[0], 6),
-        "mean": round(float(np.mean(audio, dtype=np.float64)), 6),
+        "seconds": round(len(speech.audio) / speech.sample_rate, 3),
+        "active level (dBFS)": round(speech.level_with_offset, 1),
+        "peak (dBFS)": round(peak_db(speech.audio), 1),
+        "clipped share": round(speech.clipped[0], 6),
+        "mean": round(float(np.mean(speech.audio, dtype=np.float64)), 6),
     }
 
 

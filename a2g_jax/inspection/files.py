@@ -11,7 +11,7 @@ from a2g_jax.data.datasets.smplx import BODY, HANDS, float_array, smplx_motion
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget.rig import Rig
-from a2g_jax.inspection.audio_checks import check_sound, finding_of
+from a2g_jax.inspection.audio_checks import check_sound, finding_of, speech_of
 from a2g_jax.inspection.bvh_file import check_layout, check_wraps, scan_bvh
 from a2g_jax.inspection.describe import audio_facts, body_places, motion_facts, try_rig, word_facts
 from a2g_jax.inspection.finding import Finding, Place, later, located
@@ -132,8 +132,9 @@ def inspect_audio(path: Path) -> Inspected:
     }
     if choices.channel is not None:
         facts["file"]["channel"] = choices.channel
-    facts["audio"] = audio_facts(sound.samples, info.sample_rate)
-    findings = located(check_sound(sound), path=str(path))
+    speech = speech_of(sound)
+    facts["audio"] = audio_facts(speech)
+    findings = located(check_sound(sound, speech), path=str(path))
     return Inspected(str(path), "audio", facts, findings, audio=sound.at(SAMPLE_RATE))
 
 

@@ -156,7 +156,7 @@ def check_calibration(motion: Motion) -> tuple[list[Finding], int]:
     which = "frame 0 is" if count == 1 else f"frames 0 to {count - 1} are"
     turn = float(rotation_steps(motion.clip(count - 1, count + 1)).max())
     message = f"{which} a calibration pose (such as a T-pose); then joints turn by {turn:.0f} degrees at once."
-    fix = "'a2g prepare' leaves it out; leave it out of clips to pin or to take a style from."
+    fix = "'a2g prepare' and 'a2g generate' (--pin, --style, --seed-clip) leave it out."
     return [Finding("warning", "calibration", message, fix, Place(frame=0, seconds=0.0), float(count))], count
 
 

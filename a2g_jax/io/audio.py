@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,12 @@ class Sound:
 
     def at(self, sample_rate: int) -> Float[np.ndarray, " N"]:
         """Samples at another rate, without a constant offset (:mod:`a2g_jax.features.offset`)."""
-        return resampled(without_offset(self.samples, self.info.sample_rate), self.info.sample_rate, sample_rate)
+        return resampled(self.centred, self.info.sample_rate, sample_rate)
+
+    @cached_property
+    def centred(self) -> Float[np.ndarray, " N"]:
+        """Samples without a constant offset."""
+        return without_offset(self.samples, self.info.sample_rate)
 
     def notes(self) -> list[Note]:
         """Remarks on header, channels and levels."""
@@ -216,7 +222,7 @@ def _check_level(sound: Sound) -> None:
         raise InputError(f"{path}: has samples as large as {peak:.4g}; scale them to -1 to 1.")
     fine = sound.info.subtype in _FINE and sound.info.format != "FFMPEG"
     limit, decibels = (FINE_SILENCE, -120) if fine else (SILENCE, -70)
-    if peak >= limit and np.max(np.abs(without_offset(sound.samples, sound.info.sample_rate))) >= limit:
+    if peak >= limit and max(sound.centred.max(), -sound.centred.min()) >= limit:
         return
     if sound.channels is not None and np.sqrt(sound.channels.power.max(initial=0.0)) >= limit:
         raise InputError(f"{path}: is silent as mono, because its channels cancel out; choose one with --channel.")

@@ -75,6 +75,8 @@ class Layout:
     """Position of a root that does not move, metres; None if it moves."""
     stretch: Stretch | None = None
     """The largest error of a joint's place that bones of fixed length cause, if bones move."""
+    root_doubt: str = ""
+    """Why positions of the root may be in another unit; empty if nothing shows it."""
 
 
 def fail(path: object, line: int, message: str) -> NoReturn:

@@ -75,12 +75,21 @@ def parse_bvh(path: object, text: str) -> Parsed:
         fail(path, line, f"expected 'Frame Time: <seconds>' after Frames; got {_line_at(text, after)}.")
     seconds = parse_number(found[1])
     if seconds is None or not 1e-5 <= seconds <= 5:
-        hint = comma_hint(found[1])
+        hint = comma_hint(found[1]) or _time_hint(seconds)
         fail(path, line, f"expected a frame time in seconds, such as 0.033333; got {shown(found[1])}{hint}.")
     parsed = Parsed(path, text[: start.start(1)], joints, frames, found[1], text[found.end() :].split("\n"), line)
     if parsed.channels == 0:
         fail(path, joints[0].line, "no joint has a channel, so nothing moves; add CHANNELS.")
     return parsed
+
+
+def _time_hint(seconds: float | None) -> str:
+    """What a number that cannot be a frame time may be instead."""
+    if seconds is None or not 5 < seconds <= 1000:
+        return ""
+    if any(abs(seconds - usual) < 0.02 for usual in (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240)):
+        return f" (are these frames per second? Write {1 / seconds:.6f})"
+    return f" (are these milliseconds? Write {seconds / 1000:.6f})"
 
 
 def _skip(text: str, at: int, line: int) -> tuple[int, int]:

@@ -22,6 +22,7 @@ from a2g_jax.io.bvh_hierarchy import Joint, Layout
 from a2g_jax.io.bvh_motion import Parsed, parse_bvh, read_values
 from a2g_jax.io.bvh_poses import extent, poses_of
 from a2g_jax.io.bvh_text import read_text
+from a2g_jax.io.root_unit import root_unit_doubt
 
 #: A skeleton larger than this at rest is in centimetres.
 _LARGEST_BODY = 10.0
@@ -79,6 +80,8 @@ def doubts(layout: Layout) -> list[str]:
         found.append(str(layout.unit))
     if layout.stretch is not None and layout.stretch.metres > STRETCH:
         found.append(str(layout.stretch))
+    if layout.root_doubt:
+        found.append(layout.root_doubt)
     return found
 
 
@@ -86,7 +89,8 @@ def build(parsed: Parsed, values: Float[np.ndarray, "T C"], scale: float | None 
     """The motion of the numbers of a file, and its layout."""
     joints = parsed.joints
     poses = poses_of(joints, values)
-    unit = Unit("as given", scale) if scale is not None else _unit(joints, poses.offsets)
+    roles = _roles(_skeleton(joints, poses.offsets, 1.0))
+    unit = Unit("as given", scale) if scale is not None else _unit(joints, poses.offsets, roles)
     scale = unit.metres
     motion = Motion(
         rotations=poses.rotations,
@@ -99,16 +103,21 @@ def build(parsed: Parsed, values: Float[np.ndarray, "T C"], scale: float | None 
         still = (still[0] * scale, still[1] * scale, still[2] * scale)
     if stretch is not None:
         stretch = replace(stretch, metres=stretch.metres * scale)
-    return motion, Layout(parsed.head, joints, scale, unit, poses.carrier, still, stretch)
+    doubt = root_unit_doubt(motion.skeleton, np.asarray(motion.root), roles) if roles else ""
+    return motion, Layout(parsed.head, joints, scale, unit, poses.carrier, still, stretch, doubt)
 
 
-def _unit(joints: list[Joint], offsets: Float[np.ndarray, "J 3"]) -> Unit:
-    guess = 0.01 if extent(joints, offsets) > _LARGEST_BODY else 1.0
-    skeleton = _skeleton(joints, offsets, 1.0)
+def _roles(skeleton: Skeleton) -> dict[str, int]:
+    """Joints of the body by part; none where no body is found."""
     try:
-        tall = stature(skeleton, find_parts(skeleton, "the skeleton", {})[0])
+        return find_parts(skeleton, "the skeleton", {})[0]
     except InputError:
-        tall = None
+        return {}
+
+
+def _unit(joints: list[Joint], offsets: Float[np.ndarray, "J 3"], roles: dict[str, int]) -> Unit:
+    guess = 0.01 if extent(joints, offsets) > _LARGEST_BODY else 1.0
+    tall = stature(_skeleton(joints, offsets, 1.0), roles) if roles else None
     return Unit("centimetres" if guess < 1 else "metres", guess) if tall is None else find_unit(tall, guess)
 
 

@@ -65,7 +65,7 @@ class Meter:
         some = np.concatenate([block[first :: self._step], mixed[first :: self._step, None]], axis=1)
         joined = np.concatenate([self._rest, some])
         count = len(joined) // self._size
-        blocks = joined[: count * self._size].reshape(count, self._size, -1)
+        blocks = joined[: count * self._size].reshape(count, self._size, joined.shape[1])
         squares = np.einsum("ksc,ksc->kc", blocks, blocks) / self._size
         self._power.append(np.maximum(squares - np.einsum("ksc->kc", blocks) ** 2 / self._size**2, 0))
         self._rest = joined[count * self._size :].copy()

@@ -33,6 +33,8 @@ _SIGNATURES = (
     (b"MAC ", "Monkey's Audio"),
     (b"wvpk", "WavPack audio"),
 )
+#: First bytes of files that libsndfile reads, whatever their names.
+_OTHERS = (b"RIFF", b"RF64", b"BW64", b"RIFX", b"fLaC", b"OggS", b"FORM", b"caff", b"riff")
 #: Longest time without an end, seconds.
 _TIMEOUT = 900.0
 _HEADER_LIMIT = 2**20
@@ -44,6 +46,8 @@ def ffmpeg_kind(path: Path, head: bytes) -> str:
     Args:
         head: its first bytes.
     """
+    if head[:4] in _OTHERS:
+        return ""
     if head[4:8] == b"ftyp":
         return KINDS.get(path.suffix.lower(), "an MPEG-4 file")
     # Sync word and layer of ADTS; MP3 has another layer.

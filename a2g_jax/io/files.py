@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError, OutputError
+from a2g_jax.io.other_formats import never_right
 from a2g_jax.io.temporary import temporary_path
 
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
@@ -25,7 +26,8 @@ def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
         kind: what the file should be, with its article, for the messages: ``"a BVH file"``.
 
     Raises:
-        InputError: no such file, no permission to read it, a folder or a device, or an empty file.
+        InputError: no such file, no permission to read it, a folder or a device, an empty file, a web page, a
+            pointer of Git LFS, or a packed file.
     """
     path = Path(path)
     try:
@@ -34,8 +36,8 @@ def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
             raise InputError(f"{path}: is a folder; name {kind} in it.")
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{path}: is not an ordinary file; save {kind} to disk first.")
-        with path.open("rb"):
-            pass
+        with path.open("rb") as file:
+            head = file.read(64)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; check the path.") from None
     except OSError as error:
@@ -46,6 +48,9 @@ def check_readable(path: str | os.PathLike[str], kind: str) -> Path:
         raise InputError(f"{str(path)!r}: is not a usable path; check its characters.") from None
     if status.st_size == 0:
         raise InputError(f"{path}: is empty (0 bytes); expected {kind}.")
+    reason = "" if "HTML" in kind else never_right(head)
+    if reason:
+        raise InputError(f"{path}: {reason}")
     return path
 
 

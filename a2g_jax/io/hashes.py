@@ -3,7 +3,9 @@
 import hashlib
 import json
 import os
+import stat
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -49,29 +51,55 @@ def cached_scan(path: Path, what: str, scan: Any, force: bool = False) -> Any:
     Raises:
         InputError: no such file, or it cannot be read.
     """
+    return cached_scans(path.parent, (path.name,), what, scan, force)[path.name]
+
+
+def cached_scans(folder: Path, names: Sequence[str], what: str, scan: Any, force: bool = False) -> dict[str, Any]:
+    """As :func:`cached_scan` of several files of a folder, by name, whose cache is read once.
+
+    A name may also be that of a folder of files, which changes when one of them changes.
+    """
+    path = folder
     try:
-        before = _state(path)
-        store = _store(path)
+        store = _store(folder)
         kept = _read(store)
-        entry = kept.get(path.name)
-        if not force and isinstance(entry, dict) and entry.get("state") == before and what in entry:
-            return entry[what]
-        read_at = time.time()
-        result = scan(path)
-        after = _state(path)
+        found, fresh = {}, {}
+        for name in names:
+            path = folder / name
+            before, entry = _state(path), kept.get(name)
+            same: dict[str, Any] = entry if isinstance(entry, dict) and entry.get("state") == before else {}
+            if what in same and not force:
+                found[name] = same[what]
+                continue
+            read_at = time.time()
+            found[name] = scan(path)
+            if before == _state(path) and read_at - max(before[1:3]) / 1e9 > _SETTLED:
+                fresh[name] = {**same, "state": before, what: found[name]}
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path.") from None
-    settled = read_at - max(before[1:3]) / 1e9 > _SETTLED
-    if before == after and settled:
-        same = entry if isinstance(entry, dict) and entry.get("state") == before else {}
-        _write(store, kept | {path.name: {**same, "state": before, what: result}})
-    return result
+    if fresh:
+        _write(store, kept | fresh)
+    return found
 
 
-def _state(path: Path) -> list[int]:
+def _state(path: Path) -> list[Any]:
     status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        return _folder_state(path)
     # The time of the last change of the file's entry cannot be set back by a program.
     return [status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino]
+
+
+def _folder_state(path: Path) -> list[Any]:
+    """Number of files, their latest times, and a digest of the states of all."""
+    digest, count, modified, changed = hashlib.sha256(), 0, 0, 0
+    with os.scandir(path) as entries:
+        for entry in sorted(entries, key=lambda one: one.name):
+            status = entry.stat()
+            state = (entry.name, status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
+            digest.update(repr(state).encode())
+            count, modified, changed = count + 1, max(modified, state[2]), max(changed, state[3])
+    return [count, modified, changed, digest.hexdigest()]
 
 
 def _store(path: Path) -> Path:

@@ -14,6 +14,9 @@ from a2g_jax.io.ffmpeg import conversion
 #: size when they finish.
 _PLACEHOLDERS = 0x7FFF0000
 _CHUNK = struct.Struct("<4sI")
+#: Names of usual chunks.
+_NAMES = (b"fmt ", b"data", b"fact", b"LIST", b"bext", b"iXML", b"JUNK", b"cue ", b"smpl", b"id3 ", b"PEAK", b"PAD ")
+_CONVERT = "convert it with the program that wrote it, or with ffmpeg."
 #: Bytes that end a file of samples and are no samples: tags of MP3 players.
 _TAGS = (b"TAG", b"ID3", b"APETAGEX")
 #: Seconds of samples behind the end of the data by the header that show that recording went on.
@@ -59,8 +62,11 @@ def wav_layout(path: Path) -> Layout | None:
             raise InputError(f"{path}: is cut short inside its header; copy or export it again.")
         if head[8:] != b"WAVE":
             return None
-        form, long_size = b"", None
-        for name, claimed, start in _chunks(file, 12):
+        form, long_size, found = b"", None, None
+        unpadded: list[bool] = []
+        for name, claimed, start in _chunks(file, 12, unpadded):
+            if name == b"data" and found is not None:
+                raise InputError(f"{path}: has its samples in several parts ('data' chunks); {_CONVERT}")
             if name == b"ds64" and claimed >= 16:
                 file.seek(start + 8)
                 long_size = struct.unpack("<Q", file.read(8).ljust(8, b"\0"))[0]
@@ -71,21 +77,38 @@ def wav_layout(path: Path) -> Layout | None:
                 if len(form) < 16:
                     raise InputError(f"{path}: has no sample format before its samples; export it again.")
                 size = long_size if long_size is not None and claimed == 0xFFFFFFFF else claimed
-                return _checked(path, file, Layout(form, start, size, plain=head[:4] != b"BW64"), length)
+                found = Layout(form, start, size, plain=head[:4] != b"BW64" and not unpadded)
+                if start + size >= length:
+                    break
+    if found is not None:
+        with path.open("rb") as file:
+            return _checked(path, file, found, length)
     raise InputError(
         f"{path}: is cut short: its header ends after {length} bytes, before any samples (no 'data' chunk);"
         " copy or export it again."
     )
 
 
-def _chunks(file: BinaryIO, at: int) -> Iterator[tuple[bytes, int, int]]:
-    """Name, size by the header and start of each chunk: they are padded to an even number of bytes."""
+def _chunks(file: BinaryIO, at: int, unpadded: list[bool] | None = None) -> Iterator[tuple[bytes, int, int]]:
+    """Name, size by the header and start of each chunk: they are padded to an even number of bytes.
+
+    Args:
+        unpadded: gets an entry where a writer forgot the padding of an odd chunk.
+    """
     file.seek(at)
     while len(chunk := file.read(8)) == 8:
         name, claimed = _CHUNK.unpack(chunk)
         start = file.tell()
         yield name, claimed, start
         file.seek(start + claimed + claimed % 2)
+        if claimed % 2 and name != b"data":
+            after = start + claimed
+            file.seek(after)
+            following = file.read(9)
+            forgotten = following[:4] in _NAMES and following[1:5] not in _NAMES
+            file.seek(after + (0 if forgotten else 1))
+            if forgotten and unpadded is not None:
+                unpadded.append(True)
 
 
 def _checked(path: Path, file: BinaryIO, layout: Layout, length: int) -> Layout:

@@ -53,6 +53,11 @@ def _soundfile(path: Path, head: bytes, file: Any = None) -> Any:
             reason = f"is a damaged audio file ({reason_of(error)})"
         elif _is_text(head):
             reason = "is text, not audio"
+        elif (at := max(head.find(b"RIFF"), 0)) and head[at + 8 : at + 12] == b"WAVE":
+            raise InputError(
+                f"{path}: {at} other bytes come before its header; remove them:"
+                f" tail -c +{at + 1} {shlex.quote(str(path))} > whole.wav"
+            ) from None
         elif path.suffix.lower() == ".wav" and len(head) > 44 and not head[:44].strip(b"\0"):
             raise InputError(
                 f"{path}: its header was never written (zeros); samples may follow in the other"

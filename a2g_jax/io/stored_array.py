@@ -7,6 +7,7 @@ what was computed from it. Here every piece is read by the system's ``pread``, a
 import math
 import os
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -129,7 +130,7 @@ def _header(file: Any) -> tuple[tuple[int, ...], np.dtype, int]:
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     try:
         shape, fortran, dtype = read(file)
-    except (SyntaxError, TypeError, RecursionError, MemoryError) as error:
+    except (SyntaxError, TokenError, TypeError, RecursionError, MemoryError) as error:
         raise ValueError(str(error)) from None
     if fortran or dtype.kind not in "iuf" or not shape or any(size < 0 for size in shape):
         raise ValueError(f"it holds {dtype} of shape {shape}; expected rows of plain numbers")

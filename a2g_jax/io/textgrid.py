@@ -130,6 +130,10 @@ def _text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+#: A number with a decimal comma.
+_COMMA = re.compile(r"-?\d+,\d+")
+
+
 class _Parser:
     def __init__(self, path: Path, text: str) -> None:
         self.path = path
@@ -151,6 +155,8 @@ class _Parser:
                 yield token
             elif _NUMBER.fullmatch(token):
                 yield float(token)
+            elif _COMMA.fullmatch(token):
+                self.fail(f"has a decimal comma in {token[:40]!r}; write points in numbers, or save it with Praat.")
             self.line += token.count("\n")
 
     def string(self, what: str) -> str:

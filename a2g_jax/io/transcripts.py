@@ -169,7 +169,9 @@ def _seconds(place: str, value: Any) -> float:
     if isinstance(value, str) and _SECONDS.fullmatch(value):
         value = float(value.removesuffix("s"))
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= _LONGEST:
-        raise InputError(f"{place}: expected a time in seconds from 0 on; got {_shown(value)}.")
+        comma = isinstance(value, str) and "," in value
+        hint = "; write a point in place of the comma" if comma else ""
+        raise InputError(f"{place}: expected a time in seconds from 0 on; got {_shown(value)}{hint}.")
     return float(value)
 
 

@@ -19,8 +19,14 @@ _NO_WORDS = frozenset(
 )  # fmt: skip
 #: Seconds from which a word is not one: the longest words of fast and slow speech last two.
 _LONGEST = 5.0
-#: Median length from which times are in another unit, seconds; milliseconds of a word as seconds.
-_OTHER_UNIT, _MILLISECONDS = 20.0, (20.0, 5000.0)
+#: Median length from which times are in another unit, seconds.
+_OTHER_UNIT = 20.0
+#: Code, name and factor of other units, and medians of a word's length in them.
+_UNITS = (
+    ("time-unit", "hundredths of a second", 100, (20.0, 80.0)),
+    ("milliseconds", "milliseconds", 1000, (80.0, 2000.0)),
+    ("time-unit", "units of 100 ns, as HTK writes", 10_000_000, (5e5, 2e7)),
+)
 #: Phones of English by the Montreal Forced Aligner's older models, and the share of labels that shows them.
 _ARPABET = frozenset(
     {"AA", "AE", "AH", "AO", "AW", "AY", "B", "CH", "D", "DH", "EH", "ER", "EY", "F", "G", "HH", "IH", "IY", "JH", "K",
@@ -121,10 +127,15 @@ def word_notes(words: Sequence[Word], where: str = "") -> list[Note]:
         return [Note("no-words", f"has no words{place}.", "Did the aligner fail? Align the transcript again.")]
     lengths = np.array([word.end - word.start for word in words])
     median, longest = float(np.median(lengths)), int(np.argmax(lengths))
-    if median > _OTHER_UNIT and _MILLISECONDS[0] < median < _MILLISECONDS[1] and (len(words) > 2 or _whole(words)):
-        message = f"times look like milliseconds: a word lasts {median:.4g} s (median)."
-        return [Note("milliseconds", message, "Divide them by 1000: times are in seconds.", value=median)]
+    if median > _OTHER_UNIT and (len(words) > 2 or _whole(words)):
+        for code, name, factor, (least, most) in _UNITS:
+            if least < median <= most:
+                message = f"times look like {name}: a word lasts {median:.4g} s (median)."
+                return [Note(code, message, f"Divide them by {factor}: times are in seconds.", value=median)]
     notes = []
+    if (early := min(word.start for word in words)) < 0:
+        message = f"a word begins before the recording, at {early:.3g} s."
+        notes.append(Note("early-word", message, "Are the times of another recording, or shifted?", early, early))
     if median > _OTHER_UNIT:
         message = f"times are not in seconds: a word lasts {median:.4g} s (median)."
         notes.append(Note("time-unit", message, "Convert them to seconds.", value=median))

@@ -5,8 +5,10 @@ import zlib
 from dataclasses import dataclass
 
 #: Labels of silence, noise and unknown words that aligners write without brackets.
-_MARKS = frozenset({"sil", "sp", "spn", "nsn", "oov", "unk", "eps"})
-_BRACKETED = re.compile(r"<.*>|\[.*\]|\(.*\)|\{.*\}|\*.*\*", re.DOTALL)
+_MARKS = frozenset({"sil", "sp", "spn", "nsn", "oov", "unk", "eps", "nib", "xxx", "yyy"})
+#: Marks that are words elsewhere in lower case.
+_UPPER = frozenset({"NOISE", "LAUGH", "LAUGHTER", "BREATH", "SILENCE", "COUGH", "MUSIC", "PAUSE", "INAUDIBLE"})
+_BRACKETED = re.compile(r"<.*>|\[.*\]|\(.*\)|\{.*\}|\*.*\*|\+[^+]+\+|%\S+|&=\S+", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -22,10 +24,11 @@ def is_word(text: str) -> bool:
     """Whether a label of a transcript is a spoken word.
 
     Empty labels, marks of silence and noise (``sil``, ``sp``, ``spn``), anything in brackets as a whole (``<eps>``,
-    ``<unk>``, ``[laughter]``, ``(noise)``, ``{spn}``) and labels without a letter or digit are no words.
+    ``<unk>``, ``[laughter]``, ``(noise)``, ``{spn}``, ``+breath+``), events in capitals (``NOISE``), codes with ``%``
+    or ``&=``, and labels without a letter or digit are no words.
     """
     label = text.strip()
-    if label.casefold() in _MARKS or not any(letter.isalnum() for letter in label):
+    if label.casefold() in _MARKS or label in _UPPER or not any(letter.isalnum() for letter in label):
         return False
     return _BRACKETED.fullmatch(label) is None
 

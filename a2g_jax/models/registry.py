@@ -9,7 +9,7 @@ of this package or an entry point, or be allowed by
 import os
 from importlib import import_module
 
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 from a2g_jax.models.entry import Entry
 from a2g_jax.plugins import MODELS as GROUP
 from a2g_jax.plugins import entry_points_of, load_entry_point, load_object
@@ -48,7 +48,9 @@ def find_model(name: str) -> Entry:
     elif name in (others := entry_points_of(GROUP)):
         found = load_entry_point(others[name], "model")
     else:
-        raise InputError(f"no model {name!r}; there are: {', '.join(model_names())}, or package.module:ENTRY.")
+        raise InputError(
+            f"no model {brief(repr(name))}; there are: {', '.join(model_names())}, or package.module:ENTRY."
+        )
     if not isinstance(found, Entry):
         raise InputError(f"model {name}: expected an a2g_jax.models.entry.Entry; got {type(found).__name__}.")
     return found
@@ -70,7 +72,8 @@ def find_trained_model(name: str, where: str) -> Entry:
     allowed = {*_allowed, *(part.strip() for part in os.environ.get("A2G_MODELS", "").split(","))}
     if ":" in name and name not in allowed:
         raise InputError(
-            f"{where}: is of the model {name}, code of another package; if you trust it, set A2G_MODELS={name}."
+            f"{where}: is of the model {brief(name)}, code of another package; if you trust it, set"
+            f" A2G_MODELS={brief(name)}."
         )
     try:
         return find_model(name)

@@ -13,7 +13,7 @@ from flax.traverse_util import flatten_dict, unflatten_dict
 from a2g_jax import __version__
 from a2g_jax.config import from_json
 from a2g_jax.data.body_json import body_from_json, body_to_json
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
@@ -132,10 +132,14 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             found = extremes_from_json(values["body_extremes"], config.body_reference, where)
             config = replace(config, body_extremes=found)
         steps = int(values["steps"])
-    except InputError:
-        raise
+        if not isinstance(config.corpus, dict):
+            raise TypeError("corpus is not an object")
+    except InputError as error:
+        if str(folder) in str(error):
+            raise
+        raise InputError(f"{about}: {error}") from None
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        reason = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {error}"
+        reason = f"lacks {error}" if isinstance(error, KeyError) else f"cannot be read: {brief(error, 200)}"
         raise InputError(
             f"{folder}: is damaged ({RUN_FILE} or {WEIGHTS_FILE} {reason}); restore it or train again."
         ) from None

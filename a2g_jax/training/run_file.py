@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, brief
 from a2g_jax.io.sealed import read_sealed
 from a2g_jax.models.control_curves import from_percentiles
 from a2g_jax.models.entry import Entry
@@ -51,7 +51,9 @@ def read_description(folder: Path) -> dict[str, Any]:
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")
     if values.get("version") != VERSION:
-        raise InputError(f"{about}: has version {values.get('version')}, this package reads {VERSION}; train it again.")
+        raise InputError(
+            f"{about}: has version {brief(values.get('version'))}, this package reads {VERSION}; train it again."
+        )
     return values
 
 

@@ -195,3 +195,36 @@ def test_a_corpus_that_is_edited_and_sealed_again(copy):
     seal_file(copy / "manifest.json")
     assert use(copy).recipe["note"] == "cut by hand"
     assert set(Corpus.open(copy).hashes) == {*ARRAYS, "statistics.npz"}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda m: m["recordings"][0].update(frames=[1]), "is damaged"),
+        (lambda m: m["recordings"][0].update(name=None), "is damaged"),
+        (lambda m: m["recordings"][1].update(first="a"), "is damaged"),
+        (lambda m: m["recordings"][1].update(waveform_gain="a"), "is damaged"),
+        (lambda m: m["splits"].update(train=[[0, [], 5]]), "is damaged"),
+        (lambda m: m["annotations"].__setitem__(0, True), "is damaged"),
+        (lambda m: m.update(recipe=[]), "is damaged"),
+        (lambda m: m.update(version="a" * 100_000), "has version aaaa"),
+        (lambda m: m.update(pose=[0] * 10_000), "has poses of the unknown kind"),
+    ],
+)
+def test_values_of_other_types_are_one_short_line(copy, change, words):
+    """Of a manifest that was edited, and whose checksum accepts it."""
+    manifest = json.loads((copy / "manifest.json").read_text())
+    change(manifest)
+    (copy / "manifest.json").write_text(json.dumps({**manifest, "checksum": None}))
+    with pytest.raises(InputError, match=rf"manifest\.json: {words}") as error:
+        use(copy)
+    assert len(str(error.value)) < 400 + len(str(copy))
+    assert "\n" not in str(error.value)
+
+
+def test_headers_of_arrays_that_no_parser_finishes_are_damage(copy):
+    data = (copy / "pose.npy").read_bytes()
+    for header in (b"{'descr': '<f4', 'shape': (((", b"{'descr': '<f4' \\", b'"""', b"(" * 100, b"\x00" * 60):
+        (copy / "pose.npy").write_bytes(data[:10] + header.ljust(118)[:117] + b"\n" + data[128:])
+        with pytest.raises(InputError, match=r"pose\.npy: cannot be read \("):
+            Corpus.open(copy)

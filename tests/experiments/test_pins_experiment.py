@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 
 from a2g_jax.generation.generator import Generator
+from a2g_jax.generation.pins.request import pin_of
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import demo_run
-from experiments.pins.absurd import outcomes
-from experiments.pins.clips import Take
+from experiments.pins.absurd import _outcome, outcomes
+from experiments.pins.clips import Take, absurd
 from experiments.pins.measure import SPEECH, measure
 from experiments.pins.table import markdown
 
@@ -49,3 +50,12 @@ def test_pins_of_the_experiment_are_followed(figures):
     text = markdown(figures)
     assert text.count("| demo | generated talk |") == 1
     assert "a cartwheel | refused" in text
+
+
+def test_a_dog_is_counted_as_refused(shared):
+    """Its skeleton is refused before it is a pin."""
+    case = absurd(talk(4.0, 7).motion.clip(30, 90), shared)["a dog"]
+    run = demo_run()
+    row = _outcome(run, talk(SPEECH, 3).motion, lambda: [pin_of(case(), run, "clip", 4.0)], 800.0)
+    assert row["outcome"] == "refused"
+    assert "human" in row["message"]

@@ -273,7 +273,7 @@ def test_a_calibration_pose_before_a_clip_is_left_out(run, take):
     longer = Motion(np.concatenate([pose, clip.rotations]), np.zeros((65, 3), np.float32), clip.skeleton, 30.0)
     pin = pin_of(longer, run, "clip", 1.0)
     assert pin.motion.frames == 60
-    assert "T-pose for calibration" in pin.notes[0]
+    assert "frames 0 to 4 (0.17 s), a calibration pose" in pin.notes[0]
 
 
 def test_the_paths_of_a_root_that_jumps_are_not_kept_and_named(run, plain, take):

@@ -8,7 +8,7 @@ from recordings_for_tests import CAST, RATE, clean, codes, frozen, long_talk, tu
 
 from a2g_jax.geometry.motion import resample
 from a2g_jax.geometry.retarget import find_rig
-from a2g_jax.inspection.audio_checks import check_audio, clipped_share
+from a2g_jax.inspection.audio_checks import Speech, check_audio, clipped_share
 from a2g_jax.inspection.inspect import inspect
 from a2g_jax.inspection.motion_checks import check_finite, check_motion
 from a2g_jax.inspection.sync import RATE as RATE_OF_OFFSETS
@@ -153,9 +153,9 @@ def test_repeated_frames(every):
 def test_clipping():
     audio = clean(0).audio
     loud = np.clip(audio * (4 / np.abs(audio).max()), -1, 1).astype(np.float32)
-    assert codes(check_audio(loud, RATE)) == {"clipping"}
+    assert codes(check_audio(Speech(loud, RATE))) == {"clipping"}
     # Clipped before it was made quieter, and rounded to 16 bits.
-    assert codes(check_audio((np.rint(0.3 * loud * 32767) / 32768).astype(np.float32), RATE)) == {"clipping"}
+    assert codes(check_audio(Speech((np.rint(0.3 * loud * 32767) / 32768).astype(np.float32), RATE))) == {"clipping"}
 
 
 def test_loud_is_not_clipped():
@@ -169,7 +169,7 @@ def test_loud_is_not_clipped():
 def test_silence():
     audio = clean(1).audio.copy()
     audio[3 * RATE : 10 * RATE] *= 1e-4
-    (found,) = check_audio(audio, RATE)
+    (found,) = check_audio(Speech(audio, RATE))
     assert found.code == "silence"
     assert found.value == pytest.approx(7.0, abs=0.5)
     assert found.place.seconds == pytest.approx(3.0, abs=0.5)
@@ -177,10 +177,10 @@ def test_silence():
 
 def test_offset_of_samples_and_faint_speech():
     audio = clean(2).audio
-    (found,) = check_audio(audio * np.float32(0.5) + np.float32(0.05), RATE)
+    (found,) = check_audio(Speech(audio * np.float32(0.5) + np.float32(0.05), RATE))
     assert (found.severity, found.code) == ("info", "dc")
     assert found.value == pytest.approx(0.05, abs=1e-3)
-    assert codes(check_audio(audio * np.float32(0.003), RATE)) == {"faint"}
+    assert codes(check_audio(Speech(audio * np.float32(0.003), RATE))) == {"faint"}
 
 
 def test_nan():

@@ -123,3 +123,14 @@ def test_a_folder_with_other_formats(voices, tmp_path, monkeypatch):
     write_audio(tmp_path / "a.wav", 0.9 * voices[0], RATE)
     assert find_pairs(tmp_path)[0][0].name == "a.wav"
     assert codes(inspect(tmp_path).findings) == set()
+
+
+def test_the_speech_of_a_style_is_checked_as_well(tmp_path, capsys):
+    from a2g_jax.cli.clips import _clip
+
+    path = tmp_path / "tone.wav"
+    write_audio(path, tone(4.0), RATE)
+    assert _clip("--style", "clip.bvh", str(path)).audio == path
+    assert capsys.readouterr().err.startswith(f"warning: {path}: no speech is found")
+    assert _clip("--style", "clip.bvh", None).audio is None
+    assert capsys.readouterr().err == ""

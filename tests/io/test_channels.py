@@ -117,3 +117,10 @@ def test_levels(voices, tmp_path):
         assert note.value == pytest.approx(gain)
     soundfile.write(tmp_path / "a.ogg", voice / np.abs(voice).max(), RATE)
     assert load_audio(tmp_path / "a.ogg").notes() == []
+
+
+@pytest.mark.parametrize("samples", [1, 50, 300])
+def test_files_shorter_than_a_block_of_the_measurement(voices, tmp_path, samples):
+    part = voices[0][8000 : 8000 + samples] + np.float32(0.1)
+    assert codes(tmp_path, part, part) == []
+    assert len(read_audio(tmp_path / "a.wav")) == samples

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
+from a2g_jax.io import hdf5_process
 from a2g_jax.io.hdf5 import read_hdf5
 from a2g_jax.io.untrusted import Limits
 from tests.io.fuzz_for_tests import peak_memory
@@ -176,3 +177,41 @@ def test_without_h5py_the_error_says_what_to_install(path):
     )
     result = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert 'pip install "a2g_jax[hdf5]"' in result.stdout
+
+
+def test_a_crash_of_the_library_is_one_error_and_the_next_file_is_read(path, monkeypatch):
+    with h5py.File(path, "w") as file:
+        file["a"] = np.arange(3)
+    expected = read_hdf5(path, ["a"])["a"]
+    hdf5_process._process().kill()
+    hdf5_process._process().wait()
+    np.testing.assert_array_equal(read_hdf5(path, ["a"])["a"], expected)
+    monkeypatch.setattr(hdf5_process, "_START", "import sys, os, signal; os.kill(os.getpid(), signal.SIGKILL)")
+    hdf5_process._end()
+    refused(path, "a", "is damaged .the HDF5 library crashed on it, or did not end.; copy or download it again")
+    monkeypatch.setattr(hdf5_process, "_START", "import time; time.sleep(60)")
+    monkeypatch.setattr(hdf5_process, "_SECONDS", 0.2)
+    refused(path, "a", "the HDF5 library crashed on it, or did not end")
+    monkeypatch.undo()
+    np.testing.assert_array_equal(read_hdf5(path, ["a"])["a"], expected)
+
+
+def test_relative_paths_after_a_change_of_the_folder(path, monkeypatch):
+    with h5py.File(path, "w") as file:
+        file["a"] = np.arange(3)
+    read_hdf5(path, ["a"])
+    monkeypatch.chdir(path.parent)
+    assert read_hdf5("a.h5", ["a"])["a"].tolist() == [0, 1, 2]
+    with pytest.raises(InputError, match="^a.h5: has no data set 'b'"):
+        read_hdf5("a.h5", ["b"])
+
+
+def test_all_headers_are_read_before_any_array(path):
+    """A small file cannot take more than 100 times its size and 256 MB, and the total counts."""
+    with h5py.File(path, "w") as file:
+        for name in ("a", "b"):
+            made = file.create_dataset(name, (2**24,), "f4", chunks=(2**20,), compression="gzip")
+            made[:10] = 1.0
+    assert read_hdf5(path, ["a"])["a"].nbytes == 2**26
+    with pytest.raises(InputError, match="'b' would take more than"):
+        read_hdf5(path, ["a", "b"])

@@ -88,3 +88,28 @@ def test_what_cannot_be_read_names_the_bytes(tmp_path, data, named):
     assert "\n" not in message
     if "ffmpeg" in message:
         assert f"'{path}'" in message
+
+
+@pytest.mark.parametrize("size", [3, 5, 17])
+def test_a_chunk_of_odd_length_without_padding(tmp_path, size):
+    """Many writers of tags forget the byte; the format of the samples or the samples themselves follow at once."""
+    chunk = b"LIST" + struct.pack("<I", size) + b"INFOabcdefghijklmn"[:size]
+    sound = wav_bytes(SAMPLES)
+    (tmp_path / "before.wav").write_bytes(sound[:12] + chunk + sound[12:])
+    (tmp_path / "between.wav").write_bytes(wav_bytes(SAMPLES, before=chunk))
+    (tmp_path / "padded.wav").write_bytes(wav_bytes(SAMPLES, before=chunk + b"\0"))
+    (tmp_path / "plain.wav").write_bytes(sound)
+    expected = read_audio(tmp_path / "plain.wav")
+    for name in ("before", "between", "padded"):
+        np.testing.assert_array_equal(read_audio(tmp_path / f"{name}.wav"), expected)
+
+
+def test_samples_in_two_parts_and_bytes_before_the_header_are_named(tmp_path):
+    path = tmp_path / "a.wav"
+    half = SAMPLES[:12000].tobytes()
+    path.write_bytes(wav_bytes(SAMPLES[:12000]) + b"data" + struct.pack("<I", len(half)) + half)
+    with pytest.raises(InputError, match="has its samples in several parts"):
+        read_audio(path)
+    path.write_bytes(bytes(64) + wav_bytes(SAMPLES))
+    with pytest.raises(InputError, match=r"64 other bytes come before its header; remove them: tail -c \+65"):
+        read_audio(path)

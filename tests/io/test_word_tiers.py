@@ -165,3 +165,32 @@ def test_remarks_go_to_the_reading(tmp_path):
 
 def test_real_take(shared):
     assert codes(shared / "beat" / "2_scott_0_1_1.TextGrid") == []
+
+
+@pytest.mark.parametrize(("factor", "name"), [(100, "hundredths"), (1000, "milliseconds"), (10_000_000, "100 ns")])
+def test_units_of_time_are_told_apart(factor, name, tmp_path):
+    _, (note,) = transcript_notes(grid(tmp_path / "a.TextGrid", words=spoken(*TIMES, factor=factor)))
+    assert name in note.message
+    assert note.fix == f"Divide them by {factor}: times are in seconds."
+
+
+def test_marks_of_noise_in_other_styles_are_no_words(tmp_path):
+    marks = ("NOISE", "LAUGH", "+BREATH+", "%hesitation", "&=laughs", "xxx", "<p:>", "{SL}", "#", "--", "[noise]")
+    labels = tuple(Word(mark, 0.1 * n, 0.1 * n + 0.1) for n, mark in enumerate(marks))
+    path = grid(tmp_path / "a.TextGrid", words=(*labels, Word("noise", 2.0, 2.2), Word("50%", 2.2, 2.5)))
+    assert [word.text for word in transcript_notes(path)[0]] == ["noise", "50%"]
+
+
+def test_times_before_the_recording_and_decimal_commas_are_named(tmp_path):
+    path = grid(tmp_path / "a.TextGrid", words=HELLO)
+    text = path.read_text()
+    start = str(HELLO[0].start)
+    path.write_text(text.replace(f"xmin = {start}", "xmin = -1.5"))
+    if path.read_text() != text:
+        assert "early-word" in codes(path)
+    path.write_text(text.replace(".", ","))
+    with pytest.raises(InputError, match="has a decimal comma in"):
+        transcript_notes(path)
+    (tmp_path / "a.tsv").write_text("0,1\t0,5\thello\n")
+    with pytest.raises(InputError, match="write a point in place of the comma"):
+        transcript_notes(tmp_path / "a.tsv")

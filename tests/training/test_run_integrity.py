@@ -313,3 +313,25 @@ def test_inspect_mentions_a_training_that_has_died(run_folder):
     (run_folder / "metrics.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     (found,) = (finding for finding in inspect(run_folder).findings if finding.code == "zero-gradient")
     assert (found.severity, found.value) == ("warning", 20.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"pose": "other\n"},
+        {"corpus": "text"},
+        {"model": "a" * 100_000},
+        {"version": [0] * 10_000},
+        {"fps": "a"},
+        {"model_config": {"unknown": 1}},
+        {"train_config": [1]},
+    ],
+)
+def test_values_of_other_types_in_run_json_are_one_line_with_its_name(run_folder, change):
+    values = json.loads((run_folder / "run.json").read_text())
+    (run_folder / "run.json").write_text(json.dumps({**values, **change, "checksum": None}))
+    with pytest.raises(InputError) as error:
+        load_run(run_folder)
+    assert str(run_folder) in str(error.value)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 2500 + len(str(run_folder))

@@ -67,12 +67,12 @@ def test_quantisation_error_is_below_half_a_millimetre(seed, reach, shift):
 
 
 def test_audio_is_the_same_to_16_bits(tmp_path):
-    audio = np.concatenate([tone(0.5), np.float32([1.0, -1.0, 1.5, -2.0, 0.0])])
+    audio = np.concatenate([tone(0.5), np.float32([1.0, -1.0, 0.5, 0.0])])
     data = page_data(write(tmp_path, audio=audio))
     with wave.open(io.BytesIO(base64.b64decode(data["audio"]["data"]))) as sound:
         assert (sound.getframerate(), sound.getnchannels(), sound.getsampwidth()) == (16000, 1, 2)
         samples = np.frombuffer(sound.readframes(sound.getnframes()), "<i2")
-    np.testing.assert_array_equal(samples, np.round(np.clip(audio, -1, 1) * 32767))
+    np.testing.assert_array_equal(samples, np.round(audio * 32767))
     assert data["duration"] == pytest.approx(len(audio) / 16000)
 
 
@@ -170,3 +170,17 @@ def test_a_notebook_shows_the_page_that_a_file_would_hold(tmp_path):
     assert html.unescape(source.group(1)) == written
     with pytest.raises(InputError, match="no figures"):
         show_page([], tone(2.0), 16000)
+
+
+@pytest.mark.parametrize(("peak", "played", "words"), [(0.9, 0.9, ""), (2.5, 1.0, "-8.0 dB"), (1e-4, 0.1, "+60.0 dB")])
+def test_audio_beyond_full_scale_and_too_quiet_audio_are_scaled_and_the_page_says_so(tmp_path, peak, played, words):
+    audio = tone(2.0)
+    audio = audio * np.float32(peak / np.abs(audio).max())
+    page = write(tmp_path, audio=audio, footer="A footer.")
+    with wave.open(io.BytesIO(base64.b64decode(page_data(page)["audio"]))) as file:
+        samples = np.frombuffer(file.readframes(-1), "<i2") / 32767
+    np.testing.assert_allclose(samples, audio * (played / peak), atol=2e-5)
+    footer = re.search(r"<footer>(.*?)</footer>", page)[1]
+    assert footer == (
+        "A footer." if not words else f"A footer. Audio played {words}: its peak is {peak:.2g} of full scale."
+    )

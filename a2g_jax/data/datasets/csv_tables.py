@@ -9,6 +9,8 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable
 
 _LARGEST_FILE = 2**26
+#: Cells of a table, which bounds time and memory.
+_MOST_CELLS = 2_000_000
 
 
 def read_cells(path: Path, delimiter: str = ",") -> list[tuple[int, list[str]]]:
@@ -33,6 +35,8 @@ def read_cells(path: Path, delimiter: str = ",") -> list[tuple[int, list[str]]]:
     if "\0" in text:
         raise InputError(f"{path}: is binary, not text; expected a table.")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if text.count(delimiter) + text.count("\n") > _MOST_CELLS:
+        raise InputError(f"{path}: has more than {_MOST_CELLS} cells; expected a table of one data set.")
     if delimiter != ",":
         lines = enumerate(text.split("\n"), start=1)
         return [(line, [cell.strip() for cell in row.split(delimiter)]) for line, row in lines if row.strip()]

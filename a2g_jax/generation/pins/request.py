@@ -7,7 +7,7 @@ import numpy as np
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.clip_fit import Bounds, ClipFit, animal_joints, leading_t_pose, measure_clip, refusals
-from a2g_jax.generation.clips import read_motion
+from a2g_jax.generation.clips import read_motion, without_calibration
 from a2g_jax.generation.pins.form import parse_pin
 from a2g_jax.generation.pins.repair import repair_flips
 from a2g_jax.generation.pins.smooth import resample_smoothly
@@ -72,7 +72,7 @@ def pin_of(
     bounds: Bounds | None = None,
     text: str | None = None,
 ) -> Pin:
-    """A motion as a pin: retargeted, its flips and leading T-pose removed, resampled, and turned to the run's facing.
+    """A motion as a pin: without flips and a calibration pose at its start, retargeted, resampled, and turned.
 
     Args:
         motion: on any humanoid rig, at any rate.
@@ -87,11 +87,14 @@ def pin_of(
             length.
     """
     config, text = run.config, name if text is None else text
-    source, notes = motion.skeleton, []
-    motion = on_skeleton(motion, config.skeleton, motion.fps, name)
-    if calibration := leading_t_pose(motion):
-        notes.append(f"its first {calibration / motion.fps:.2f} s, a T-pose for calibration, are left out")
-        motion = motion.clip(calibration, motion.frames)
+    whole, source = motion, motion.skeleton
+    motion, left = without_calibration(whole)
+    notes = list(left)
+    motion = on_skeleton(motion, config.skeleton, motion.fps, name, whole)
+    # One that is held for longer than a calibration is looked for.
+    if held := leading_t_pose(motion):
+        notes.append(f"its first {held / motion.fps:.2f} s, a T-pose for calibration, left out")
+        motion = motion.clip(held, motion.frames)
     # No frame beyond the last one of the clip, which would be held there and stop the motion.
     frames = int((motion.frames - 1) * config.fps / motion.fps + 1e-6) + 1
     if length is not None:
@@ -110,7 +113,8 @@ def pin_of(
         animal = animal_joints(source)
         if animal:
             reasons.insert(0, f"has joints that people do not have ({', '.join(animal[:2])}); is it an animal?")
-        raise InputError(f"{text}: {' It also '.join(reasons)}")
+        without = f" ({notes[0]})" if left else ""
+        raise InputError(f"{text}: {' It also '.join(reasons)}{without}")
     if fit.travel > _TRAVEL:
         notes.append(
             f"its path of {fit.travel:.1f} m along the floor is not kept: the body stays where it stands, and steps are"

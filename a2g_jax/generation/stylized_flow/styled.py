@@ -1,7 +1,7 @@
 """Samples in the style or with the seed poses of clips from files."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.clips import read_motion
+from a2g_jax.generation.clips import read_motion, without_calibration
 from a2g_jax.generation.drafts import Draft, enter, recorded
 from a2g_jax.generation.generator import plant_rotations, speech_features
 from a2g_jax.generation.seed_bounds import REMEDY, seed_stretches
@@ -107,15 +107,16 @@ class Styling:
 
     def _seed(self, space: FlowSpace) -> Fitted:
         assert self.seed_clip is not None
-        motion, fps = read_motion(self.seed_clip.path), space.run.config.fps
+        motion, notes = without_calibration(read_motion(self.seed_clip.path))
+        fps = space.run.config.fps
         self._check_seed(round(motion.seconds * fps), space)
         # Only its end is continued, and faults before it do not matter.
         needed = round((space.history / fps + _BEFORE_SEED) * motion.fps)
         end = motion.clip(max(0, motion.frames - needed), motion.frames)
         fitted = fit(end, space.run, self.seed_clip.label, whole=False)
-        # Without a leading T-pose, and with no frame beyond its last one, it may be shorter than the file.
+        # With no frame beyond its last one, it may be shorter than the file.
         self._check_seed(len(fitted.rows), space)
-        return fitted
+        return replace(fitted, notes=(*notes, *fitted.notes))
 
     def _check_seed(self, frames: int, space: FlowSpace) -> None:
         assert self.seed_clip is not None

@@ -24,6 +24,8 @@ from a2g_jax.io.untrusted.values import check_key, check_value
 
 _TENSORS_FROM = 64
 _MOST_BLOBS = 2**20
+#: Memory that a value may take: this, and so much for each byte of its data, which bounds the time as well.
+_LEAST, _TIMES = 2**26, 100
 #: Types of the elements of an array that was written as a list, by the kind of its NumPy type.
 _ELEMENTS: dict[str, tuple[type, ...]] = {
     "b": (bool,), "i": (int,), "u": (int,), "f": (int, float), "c": (), "S": (bytes,), "U": (str,),
@@ -45,6 +47,7 @@ def decode_arrow(data: bytes, name: str, limits: Limits | None = None) -> Any:
         InputError: damaged, beyond the limits, or with any other content.
     """
     budget = Budget(name, limits or Limits())
+    budget.bound(_LEAST + _TIMES * len(data))
     try:
         value = _decode(data, budget)
     except InputError:

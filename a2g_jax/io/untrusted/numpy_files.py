@@ -13,6 +13,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import BinaryIO
 
 import numpy as np
@@ -179,18 +180,27 @@ def _header(data: bytes | bytearray, budget: Budget) -> tuple[np.dtype, tuple[in
     if size > _LONGEST_HEADER or start + size > len(data):
         raise budget.damage(8, f"a header of {size} bytes")
     text = data[start : start + size].decode("latin-1").rstrip()
-    if not _HEADER.fullmatch(text):
+    parsed = _parsed(text)
+    if parsed is None:
         if "'descr': [" in text:
             raise budget.error(start, f"is an array of records; expected plain numbers or text; {CONVERT}.")
         raise budget.damage(start, "its header is not as numpy.save writes it")
+    description, fortran, sizes = parsed
+    dtype = plain_type(description, budget, start, objects=True)
+    return dtype, check_shape(sizes, budget, start), fortran, start + size
+
+
+@lru_cache(maxsize=64)  # headers are read before arrays, so each one twice
+def _parsed(text: str) -> tuple[str, bool, tuple[int, ...]] | None:
+    """Type, whether the first axis varies fastest, and shape in a header; None if it is not as NumPy writes it."""
+    if not _HEADER.fullmatch(text):
+        return None
     items = [next((part for part in match if part), "") for match in re.findall(_ITEM, text)]
     found = dict(zip(re.findall(r"'(descr|fortran_order|shape)':", text), items, strict=True))
     sizes = [part.strip() for part in found.get("shape", "").split(",")]
     if len(found) != 3 or not all(_SIZE.fullmatch(part) for part in sizes if part):
-        raise budget.damage(start, "its header is not as numpy.save writes it")
-    dtype = plain_type(found["descr"], budget, start, objects=True)
-    shape = check_shape(tuple(int(part.rstrip("L")) for part in sizes if part), budget, start)
-    return dtype, shape, found["fortran_order"] == "True", start + size
+        return None
+    return found["descr"], found["fortran_order"] == "True", tuple(int(part.rstrip("L")) for part in sizes if part)
 
 
 class _SmallReads(io.RawIOBase):

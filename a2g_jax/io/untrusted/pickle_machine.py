@@ -11,7 +11,7 @@ from a2g_jax.io.untrusted.refused import Refused, RefusedError, check_read
 from a2g_jax.io.untrusted.values import check_key
 
 #: Bytes charged for a value and its place on the stack.
-_SMALL, _CONTAINER = 64, 240
+_SMALL, _CONTAINER, _PLACEHOLDER = 64, 240, 1000
 _HIGHEST_PROTOCOL = 5
 
 
@@ -70,6 +70,8 @@ class PickleMachine:
         """Push a placeholder, or raise the error."""
         if not self.placeholders:
             raise error
+        self.budget.work(4, self.at)
+        self.budget.charge(_PLACEHOLDER, self.at)
         self.push(Refused(str(error)))
 
     def refuse_opcode(self, name: str) -> None:
@@ -148,6 +150,7 @@ class PickleMachine:
             self.refuse(error)
 
     def build(self) -> None:
+        self.budget.work(1, self.at)
         state, thing = self.pop(), self.pop()
         try:
             self.push(finish(thing, state, self.budget, self.at))
@@ -182,6 +185,7 @@ class PickleMachine:
         self.refuse_opcode("BINPERSID")
 
     def tuple_of(self, count: int) -> None:
+        self.budget.work(1, self.at)
         items = [self.pop() for _ in range(count)][::-1]
         self.push(tuple(items))
 

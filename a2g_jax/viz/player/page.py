@@ -16,7 +16,7 @@ from a2g_jax.io.words import Word
 from a2g_jax.viz.player.encode import encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.shape import build_shape
-from a2g_jax.viz.player.sound import encode_audio
+from a2g_jax.viz.player.sound import encode_audio, playback_note
 from a2g_jax.viz.player.stage import placement, shape_points
 
 #: Parts of the script, in their order in the page.
@@ -100,6 +100,7 @@ def page_html(
         "lanes": [lane.encoded() for lane in lanes],
         "figures": [_figure(figure) for figure in figures],
     }
+    footer = " ".join(filter(None, (footer, playback_note(audio))))
     return fill_template(
         _template("page.html"),
         {
