@@ -15,7 +15,7 @@ from a2g_jax.models.emotion_gesture.config import PRESETS
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder, standardised
 from a2g_jax.models.emotion_gesture.model import build
 from a2g_jax.models.emotion_gesture.networks import Networks
-from a2g_jax.models.emotion_gesture.objective import generate, judged
+from a2g_jax.models.emotion_gesture.objective import continued, generate, judged
 from a2g_jax.models.emotion_gesture.prompter import interpolate, reinforce
 from a2g_jax.models.emotion_gesture.sampling import EmotionGestureSampling
 from a2g_jax.models.registry import find_model
@@ -403,7 +403,8 @@ class TestObjective:
         latent = jax.random.normal(jax.random.key(3), (3, CONFIG.vae_latent))
         both = judged(networks, params, batch, audio, made, None, latent)
         features = networks.decode_emotion(params, latent, both.label[3:])
-        own = networks.decode(params, audio._replace(emotion=features), target[:, : CONFIG.seed_frames])
+        seed = continued(networks, params, audio, features, target[:, : CONFIG.seed_frames], None)
+        own = networks.decode(params, audio._replace(emotion=features), seed)
         np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
         generator = stage(model, "sampled").updates[1].loss
         gradient = jax.jit(jax.grad(lambda p: generator(p, jax.random.key(0), batch, jnp.int32(0))[0]))(params)
@@ -414,6 +415,25 @@ class TestObjective:
         }
         assert moved == {"fusion", "encoder", "prompter", "decoder", "hold"}
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["vae"]))
+
+    def test_exchanged_motions_continue_the_chunks_of_generation(self):
+        config = replace(CONFIG, continued_chunks=2)
+        networks, batch = Networks(config, make_data()), make_batch()
+        params = make_params(build(config, make_data()))
+        audio, _, target = generate(networks, params, batch)
+        recorded = target[:, : config.seed_frames]
+        found = continued(networks, params, audio, audio.emotion, recorded, None)
+        np.testing.assert_array_equal(found[0], recorded[0])
+        expected = recorded
+        for chunk, before in enumerate(([2, 0, 1], [1, 2, 0]), start=1):
+            mixed = audio._replace(beat=audio.beat[jnp.array(before)])
+            made = networks.pose(networks.decode(params, mixed, expected)[:, -config.seed_frames :])
+            expected = networks.flat(networks.data.space.valid(made))
+            np.testing.assert_allclose(found[chunk], expected[chunk], atol=1e-5)
+        grow = lambda p: jnp.sum(continued(networks, p, audio, audio.emotion, recorded, None))  # noqa: E731
+        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(jax.grad(grow)(params)))
+        none = Networks(replace(config, continued_chunks=0), make_data())
+        np.testing.assert_array_equal(continued(none, params, audio, audio.emotion, recorded, None), recorded)
 
     def test_the_vae_begins_with_the_scale_of_the_features(self):
         model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()

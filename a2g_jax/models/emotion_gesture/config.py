@@ -14,7 +14,7 @@ PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
 DISCRIMINATORS = ("transformer", "patches")
 #: Whole numbers that may be 0.
-_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps")
+_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps", "continued_chunks")
 
 
 @dataclass(frozen=True)
@@ -132,6 +132,9 @@ class EmotionGestureConfig:
     sampled_steps: int = 0
     """Training steps of the motion with sampled emotion features, after the VAE: with 'exchange', the emotions that the
     discriminator judges are then sampled."""
+    continued_chunks: int = 0
+    """Chunks that the exchanged motions continue at most, in training with sampled emotion features: their initial
+    poses are then those that generation gives itself. 0 begins all with recorded poses."""
     vae_latent: int = 32
     """Length of the emotion-conditioned VAE's latent."""
     vae_channels: int = 40
@@ -247,6 +250,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         mining_steps=3_000,
         vae_steps=600,
         sampled_steps=2_000,
+        continued_chunks=3,
         vae_kl_weight=0.01,
         vae_emotion_weight=0.6,
     ),
