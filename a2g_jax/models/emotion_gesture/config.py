@@ -250,7 +250,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         mining_steps=3_000,
         vae_steps=600,
         sampled_steps=2_000,
-        continued_chunks=3,
+        continued_chunks=7,
         vae_kl_weight=0.01,
         vae_emotion_weight=0.6,
     ),
