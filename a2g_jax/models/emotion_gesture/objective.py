@@ -223,6 +223,19 @@ def discriminator_loss(networks: Networks, training: bool, sampled: bool = False
     return loss
 
 
+def average_loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Array, Terms]:
+    """Zero, with the gradient of half the squared distance of ``average`` from the generator.
+
+    A step of gradient descent at the rate ``1 - decay`` is then one of the exponential moving average. The distance is
+    no loss of the model, and the norm of its gradient is in the log anyway.
+    """
+    del key, batch, step
+    generator = jax.lax.stop_gradient(params["generator"])
+    apart = jax.tree.map(lambda mean, new: jnp.sum(jnp.square(mean - new)), params["average"], generator)
+    half = 0.5 * sum(jax.tree.leaves(apart), start=jnp.zeros(()))
+    return half - jax.lax.stop_gradient(half), {}
+
+
 def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
     """Relative squared error of emotion features, the KL divergence, and the emotion of features that are sampled.
 
