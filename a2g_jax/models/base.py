@@ -171,6 +171,9 @@ class Model(NamedTuple):
     needs_perceptual: bool = False
     """Whether a loss needs :attr:`Data.perceptual`."""
 
+    finish: Callable[[Params], Params] | None = None
+    """``finish(params) -> params``: those of the run, with which it generates, from those of training; None where they
+    are the same."""
     use_words: Callable[[Params, tuple[str, ...]], Params] | None = None
     """``use_words(params, words) -> params``: initial parameters given the words of the training corpus, once before
     the first step and not compiled; for pretrained word vectors."""
@@ -219,3 +222,8 @@ class Model(NamedTuple):
     """``style_code(params, pose (T, R, D)) -> (S,)``: what the model keeps of a clip as its style."""
     density: Density | None = None
     classifier: Classifier | None = None
+
+
+def finished(model: Model, params: Params) -> Params:
+    """The parameters of a run from those of its training; see :attr:`Model.finish`."""
+    return params if model.finish is None else model.finish(params)

@@ -15,7 +15,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
-from a2g_jax.models.base import Model
+from a2g_jax.models.base import Model, finished
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual, Run, RunConfig, Source
 from a2g_jax.training.run_file import WEIGHTS_FILE, run_folder
@@ -147,7 +147,7 @@ def adapted_statistics(
 def _check_networks(config: RunConfig, run: Run, corpus: Corpus) -> None:
     """Refuse settings or labels with which the weights would be those of other networks."""
     model = config.build()
-    expected = flatten_dict(jax.eval_shape(model.init, jax.random.key(0)), sep="/")
+    expected = flatten_dict(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0)), sep="/")
     found = flatten_dict(run.params, sep="/")
     shapes = lambda arrays: {name: tuple(array.shape) for name, array in arrays.items()}  # noqa: E731
     if shapes(expected) != shapes(found):

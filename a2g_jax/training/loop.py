@@ -23,7 +23,7 @@ from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder
 from a2g_jax.io.locks import locked
 from a2g_jax.io.temporary import sweep
-from a2g_jax.models.base import Model, Params
+from a2g_jax.models.base import Model, Params, finished
 from a2g_jax.progress import say
 from a2g_jax.training.averaging import weight_average
 from a2g_jax.training.body_extremes import corpus_extremes
@@ -273,7 +273,7 @@ def _export(
     state: TrainState,
 ) -> Run:
     """Write weights and the latent summary to the run folder, for generation."""
-    params = jax.device_get(average(state.params))
+    params = jax.device_get(finished(model, average(state.params)))
     summary = collect_summary(model, params, corpus, config)
     run = Run(config, params, summary, int(state.step))
     save_run(out, run, log.written)

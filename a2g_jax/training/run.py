@@ -19,7 +19,7 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import atomic_path, sha256_file
 from a2g_jax.metrics.body.bounds import extremes_from_json, extremes_to_json
-from a2g_jax.models.base import Model, Params
+from a2g_jax.models.base import Model, Params, finished
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual as Perceptual
@@ -183,7 +183,7 @@ def _check_params(weights: Path, model: Model, params: Params) -> None:
     """Compare shapes with the model's own, before anything is computed."""
     import jax
 
-    expected = flatten_dict(jax.eval_shape(model.init, jax.random.key(0)), sep="/")
+    expected = flatten_dict(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0)), sep="/")
     found = flatten_dict(params, sep="/")
     for name in sorted({*expected, *found}):
         want, got = expected.get(name), found.get(name)

@@ -55,14 +55,17 @@ def init_state(model: Model, spans: tuple[StageSpan, ...], seed: int, start: Par
     """The state at step 0, with the optimisers of all stages.
 
     Args:
-        start: parameters in place of initial ones.
+        start: parameters of a run in place of initial ones; those that training alone has are initial.
     """
     key = jax.random.key(seed)
     # Step numbers count up from 0, so the initial weights take the one number that no step has.
+    first = jax.random.fold_in(key, jnp.uint32(2**32 - 1))
     if start is None:
-        params = jax.jit(model.init)(jax.random.fold_in(key, jnp.uint32(2**32 - 1)))
-    else:
+        params = jax.jit(model.init)(first)
+    elif set(jax.eval_shape(model.init, first)) <= set(start):
         params = jax.tree.map(jnp.array, start)
+    else:
+        params = {**jax.jit(model.init)(first), **jax.tree.map(jnp.array, start)}
     optimisers = {
         optimiser_name(span.stage, update): optimiser_of(update, span.config).init(trained(update, params))
         for span in spans

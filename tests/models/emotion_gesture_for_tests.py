@@ -36,6 +36,8 @@ CONFIG = replace(
     mining_steps=5,
     vae_steps=8,
     sampled_steps=6,
+    average_decay=0.0,
+    continued_chunks=2,
 )
 BANDS, SPECTRA, JOINTS = 6, 2, 3
 EMOTIONS = ("anger", "happiness", "neutral")

@@ -9,13 +9,13 @@ import pytest
 from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_batch, make_data, make_params, stage
 
 from a2g_jax.errors import InputError
-from a2g_jax.models.base import Condition
+from a2g_jax.models.base import Condition, finished
 from a2g_jax.models.emotion_gesture.chunks import sample_emotion
 from a2g_jax.models.emotion_gesture.config import PRESETS
 from a2g_jax.models.emotion_gesture.mining import AudioEncoder, standardised
 from a2g_jax.models.emotion_gesture.model import build
 from a2g_jax.models.emotion_gesture.networks import Networks
-from a2g_jax.models.emotion_gesture.objective import generate, judged
+from a2g_jax.models.emotion_gesture.objective import continued, generate, judged
 from a2g_jax.models.emotion_gesture.prompter import interpolate, reinforce
 from a2g_jax.models.emotion_gesture.sampling import EmotionGestureSampling
 from a2g_jax.models.registry import find_model
@@ -87,7 +87,7 @@ class TestSize:
 
     def test_tiny(self):
         model = build(PRESETS["tiny"], make_data(22, tuple("abcdefgh"), 128, 2))
-        assert 1.2e6 < size(jax.eval_shape(model.init, jax.random.key(0))) < 2e6
+        assert 1.2e6 < size(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0))) < 2e6
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -403,7 +403,8 @@ class TestObjective:
         latent = jax.random.normal(jax.random.key(3), (3, CONFIG.vae_latent))
         both = judged(networks, params, batch, audio, made, None, latent)
         features = networks.decode_emotion(params, latent, both.label[3:])
-        own = networks.decode(params, audio._replace(emotion=features), target[:, : CONFIG.seed_frames])
+        seed = continued(networks, params, audio, features, target[:, : CONFIG.seed_frames], None)
+        own = networks.decode(params, audio._replace(emotion=features), seed)
         np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
         generator = stage(model, "sampled").updates[1].loss
         gradient = jax.jit(jax.grad(lambda p: generator(p, jax.random.key(0), batch, jnp.int32(0))[0]))(params)
@@ -414,6 +415,54 @@ class TestObjective:
         }
         assert moved == {"fusion", "encoder", "prompter", "decoder", "hold"}
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["vae"]))
+
+    def test_the_run_has_the_average_of_the_generator(self):
+        """Over the last stage with a discriminator, from its beginning on."""
+        config = replace(CONFIG, average_decay=0.75)
+        model, batch = build(config, make_data()), make_batch()
+        assert ["average" in [one.name for one in each.updates] for each in model.stages] == [False, False, False, True]
+        last = stage(model, "sampled")
+        params = last.warm_start(make_params(model), batch)
+        mean = params["generator"]
+        assert all(np.array_equal(a, b) for a, b in zip(*map(jax.tree.leaves, (mean, params["average"])), strict=True))
+        update = last.updates[2]
+        optimiser, state = update.optimiser(None), None
+        for number in range(3):
+            moved = jax.tree.map(lambda leaf, n=number: leaf + 0.1 * (n + 1), params["generator"])
+            params = params | {"generator": moved}
+            loss = lambda own, p=params: update.loss({**p, **own}, None, batch, 0)[0]  # noqa: E731
+            value, gradient = jax.value_and_grad(loss)({"average": params["average"]})
+            assert value == 0
+            state = optimiser.init(gradient) if state is None else state
+            changes, state = optimiser.update(gradient, state)
+            params = params | {"average": jax.tree.map(jnp.add, params["average"], changes["average"])}
+            mean = jax.tree.map(lambda old, new: 0.75 * old + 0.25 * new, mean, moved)
+        run = model.finish(params)
+        assert set(run) == {"generator", "discriminator", "vae"}
+        for found, expected in zip(*map(jax.tree.leaves, (run["generator"], mean)), strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
+        assert build(CONFIG, make_data()).finish is None
+        without = build(replace(config, sampled_steps=0), make_data())
+        assert [update.name for update in stage(without, "main").updates] == ["discriminator", "generator", "average"]
+
+    def test_exchanged_motions_continue_the_chunks_of_generation(self):
+        config = replace(CONFIG, continued_chunks=2)
+        networks, batch = Networks(config, make_data()), make_batch()
+        params = make_params(build(config, make_data()))
+        audio, _, target = generate(networks, params, batch)
+        recorded = target[:, : config.seed_frames]
+        found = continued(networks, params, audio, audio.emotion, recorded, None)
+        np.testing.assert_array_equal(found[0], recorded[0])
+        expected = recorded
+        for chunk, before in enumerate(([2, 0, 1], [1, 2, 0]), start=1):
+            mixed = audio._replace(beat=audio.beat[jnp.array(before)])
+            made = networks.pose(networks.decode(params, mixed, expected)[:, -config.seed_frames :])
+            expected = networks.flat(networks.data.space.valid(made))
+            np.testing.assert_allclose(found[chunk], expected[chunk], atol=1e-5)
+        grow = lambda p: jnp.sum(continued(networks, p, audio, audio.emotion, recorded, None))  # noqa: E731
+        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(jax.grad(grow)(params)))
+        none = Networks(replace(config, continued_chunks=0), make_data())
+        np.testing.assert_array_equal(continued(none, params, audio, audio.emotion, recorded, None), recorded)
 
     def test_the_vae_begins_with_the_scale_of_the_features(self):
         model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()

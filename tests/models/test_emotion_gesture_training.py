@@ -89,9 +89,13 @@ def leaves(tree, path=()):
 def test_the_second_stage_leaves_everything_but_the_vae(run):
     from orbax.checkpoint import v1 as ocp
 
-    before = dict(leaves(ocp.load(run.absolute() / "checkpoints" / "8")["params"]))
-    after = dict(leaves(load_run(run).params))
+    states = [dict(leaves(ocp.load(run.absolute() / "checkpoints" / step)["params"])) for step in ("8", "10", "12")]
+    before, after, last = states
     assert {name.split("/")[0] for name in after if not np.array_equal(after[name], before[name])} == {"vae"}
+    found = dict(leaves(load_run(run).params))
+    for name, value in found.items():
+        np.testing.assert_array_equal(value, last[name.replace("generator/", "average/")])
+    assert not any(name.startswith("average/") for name in found)
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
     main_lines = [line for line in lines if line["split"] == "train" and line["step"] <= 6]
     terms = {"reconstruction", "smooth", "adversarial", "discriminator", "emotion", "beat", "emotion_accuracy"}

@@ -14,7 +14,7 @@ PROMPT_SPACES = ("features", "poses")
 BEAT_FORMS = ("printed", "words")
 DISCRIMINATORS = ("transformer", "patches")
 #: Whole numbers that may be 0.
-_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps")
+_MAYBE_NONE = ("smoothing", "mining_steps", "vae_steps", "sampled_steps", "continued_chunks")
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,9 @@ class EmotionGestureConfig:
     """Width of the discriminator's layers."""
     discriminator_rate: float = 1.0
     """Its learning rate, relative to the generator's."""
+    average_decay: float = 0.0
+    """Decay a step of the moving average of the generator's weights over the last stage with a discriminator, whose
+    players go round each other; the averages are the run's weights. 0 for the last ones."""
     mismatched: bool = False
     """Whether recorded motion with the audio of another clip counts as false (Reed et al. 2016), so that the
     discriminator judges how motion and audio agree; only with 'patches'."""
@@ -132,6 +135,9 @@ class EmotionGestureConfig:
     sampled_steps: int = 0
     """Training steps of the motion with sampled emotion features, after the VAE: with 'exchange', the emotions that the
     discriminator judges are then sampled."""
+    continued_chunks: int = 0
+    """Chunks that the exchanged motions continue at most, in training with sampled emotion features: their initial
+    poses are then those that generation gives itself. 0 begins all with recorded poses."""
     vae_latent: int = 32
     """Length of the emotion-conditioned VAE's latent."""
     vae_channels: int = 40
@@ -173,8 +179,9 @@ class EmotionGestureConfig:
                 raise _refused(name, "0 or more", getattr(self, name))
         if not 0 < self.discriminator_rate < float("inf"):
             raise _refused("discriminator_rate", "a number above 0", self.discriminator_rate)
-        if not 0 <= self.dropout < 1:
-            raise _refused("dropout", "0 or more and below 1", self.dropout)
+        for name in ("dropout", "average_decay"):
+            if not 0 <= getattr(self, name) < 1:
+                raise _refused(name, "0 or more and below 1", getattr(self, name))
         for name in ("channels", "discriminator_channels"):
             if getattr(self, name) % self.heads:
                 raise _refused(name, f"a multiple of the {self.heads} --heads", getattr(self, name))
@@ -195,6 +202,11 @@ class EmotionGestureConfig:
     def mines(self) -> bool:
         """Whether there are emotion and beat features."""
         return self.branches == "emotion-beat"
+
+    @property
+    def averages(self) -> bool:
+        """Whether the generator's weights are averaged over steps."""
+        return self.average_decay > 0 and self.adversarial_weight > 0
 
     @property
     def trains_sampled(self) -> bool:
@@ -237,6 +249,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         smoothing=3,
         discriminator="patches",
         discriminator_channels=64,
+        average_decay=0.998,
         mismatched=True,
         exchange=True,
         reconstruction_weight=2.5,
@@ -247,6 +260,7 @@ PRESETS: dict[str, EmotionGestureConfig] = {
         mining_steps=3_000,
         vae_steps=600,
         sampled_steps=2_000,
+        continued_chunks=7,
         vae_kl_weight=0.01,
         vae_emotion_weight=0.6,
     ),

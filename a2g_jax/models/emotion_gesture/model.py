@@ -18,6 +18,7 @@ from a2g_jax.models.emotion_gesture.chunks import Given, State
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
 from a2g_jax.models.emotion_gesture.networks import Networks
 from a2g_jax.models.emotion_gesture.objective import (
+    average_loss,
     discriminator_loss,
     generate,
     generator_loss,
@@ -110,6 +111,10 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         text = params["generator"]["text"] | {"vectors": jnp.asarray(filled)}
         return params | {"generator": params["generator"] | {"text": text}}
 
+    def finish(params: Params) -> Params:
+        """The parameters with the averages of the generator's weights in place of the last ones."""
+        return {name: own for name, own in params.items() if name != "average"} | {"generator": params["average"]}
+
     reads = config.mines and config.beat_weight > 0
     return Model(
         "emotion_gesture",
@@ -120,6 +125,7 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         _stages(networks),
         summarise,
         batch_fields=("audio", "pose", "emotion", *(("words", "word_starts") if reads else ())),
+        finish=finish if config.averages else None,
         use_words=use_words if reads and config.word_vectors else None,
         condition=condition,
         condition_fields=("audio", "seed_poses", *(("emotion",) if conditioned else ())),
@@ -141,19 +147,19 @@ def _stages(networks: Networks) -> tuple[Stage, ...]:
     if config.mines and config.mining_steps > 0:
         features = Update(mining_loss(networks, True), ("generator",))
         stages.append(Stage((features,), "mining", config.mining_steps, mining_loss(networks, False)))
-    stages.append(Stage(_game(networks, False), validation_loss=generator_loss(networks, False)))
+    stages.append(_game(networks, Stage((), validation_loss=generator_loss(networks, False)), sampled=False))
     if networks.samples_emotions:
         update = Update(vae_loss(networks), ("vae",), optimiser=_vae_optimiser)
         measure = lambda params, batch: networks.measure_features(params, batch.audio)  # noqa: E731
         stages.append(Stage((update,), "emotion_vae", config.vae_steps, warm_start=measure))
     if config.trains_sampled:
         held_out = generator_loss(networks, False, True)
-        stages.append(Stage(_game(networks, True), "sampled", config.sampled_steps, held_out))
+        stages.append(_game(networks, Stage((), "sampled", config.sampled_steps, held_out), sampled=True))
     return tuple(stages)
 
 
-def _game(networks: Networks, sampled: bool) -> tuple[Update, ...]:
-    """The updates of the generator and its discriminator.
+def _game(networks: Networks, stage: Stage, sampled: bool) -> Stage:
+    """A stage with the updates of the generator and its discriminator; the last one also averages the generator.
 
     Args:
         sampled: with sampled emotion features.
@@ -162,12 +168,16 @@ def _game(networks: Networks, sampled: bool) -> tuple[Update, ...]:
     optimiser = partial(make_optimiser, momentum=_MOMENTUM)
     generator = Update(generator_loss(networks, True, sampled), ("generator",), "generator", optimiser)
     if config.adversarial_weight == 0:
-        return (generator,)
+        return stage._replace(updates=(generator,))
     slower = lambda settings: optimiser(  # noqa: E731
         replace(settings, learning_rate=config.discriminator_rate * settings.learning_rate)
     )
     judge = Update(discriminator_loss(networks, True, sampled), ("discriminator",), "discriminator", slower)
-    return judge, generator
+    if not config.averages or sampled != config.trains_sampled:
+        return stage._replace(updates=(judge, generator))
+    average = Update(average_loss, ("average",), "average", lambda _: optax.sgd(1.0 - config.average_decay))
+    begin = lambda params, _: params | {"average": params["generator"]}  # noqa: E731
+    return stage._replace(updates=(judge, generator, average), warm_start=begin)
 
 
 def _vae_optimiser(settings: TrainConfig) -> optax.GradientTransformation:

@@ -91,7 +91,8 @@ class Networks:
         self.samples_emotions = c.mines and c.vae_steps > 0
 
     def init(self, key: Key[Array, ""]) -> Params:
-        """Initial parameters: ``generator``, and ``discriminator`` and ``vae`` where the settings have them."""
+        """Initial parameters: ``generator``, and ``discriminator``, ``vae`` and ``average`` of the generator where the
+        settings have them."""
         c = self.config
         audio = jnp.zeros((1, c.clip_frames, self.data.audio_bands))
         rows = jnp.zeros((1, c.clip_frames, c.channels))
@@ -119,6 +120,8 @@ class Networks:
             motion = self.flat(jnp.broadcast_to(self.data.pose_statistics.mean, (1, c.clip_frames, *self.rows)))
             inputs["judge"] = self._judged(motion, audio, jnp.zeros((1, self.classes)))
             params["discriminator"] = self._judge.init(jax.random.fold_in(key, 100), *inputs["judge"])["params"]
+        if c.averages:
+            params["average"] = jax.tree.map(jnp.array, params["generator"])
         if self.samples_emotions:
             label, latent = jnp.zeros((1, self.classes)), jnp.zeros((1, c.vae_latent))
             params["vae"] = {

@@ -66,16 +66,47 @@ def judged(
     if not networks.config.exchanges or audio.emotion is None:
         return Judged(made, batch.audio, label)
     wanted = jnp.roll(label, 1, axis=0)
+    seed = networks.flat(batch.pose)[:, : networks.config.seed_frames]
     if latent is None:
         features = jnp.roll(audio.emotion, 1, axis=0)
     else:
         wanted = jnp.where(jnp.arange(len(label))[:, None] % 2 == 0, label, wanted)
         features = networks.decode_emotion(params, latent, wanted)
-    seed = networks.flat(batch.pose)[:, : networks.config.seed_frames]
+        seed = continued(networks, params, audio, features, seed, key)
     exchanged = networks.decode(params, audio._replace(emotion=features), seed, None, key)
     return Judged(
         jnp.concatenate([made, exchanged]), jnp.concatenate([batch.audio] * 2), jnp.concatenate([label, wanted])
     )
+
+
+def continued(
+    networks: Networks,
+    params: Params,
+    audio: AudioFeatures,
+    emotion: Float[Array, "B N D"],
+    seed: Float[Array, "B M C"],
+    key: DropoutKey,
+) -> Float[Array, "B M C"]:
+    """Initial poses as generation gives them to itself: the last ones of chunks with the same emotion, as constants.
+
+    Clip ``i`` continues ``i mod (continued_chunks + 1)`` chunks, whose audio is that of the clips before it. With
+    recorded initial poses alone, errors of a chunk are never among the initial poses of training, and accumulate.
+
+    Args:
+        emotion: emotion features of the chunks.
+        seed: recorded initial poses.
+    """
+    config, space = networks.config, networks.data.space
+    params, audio, emotion = jax.lax.stop_gradient((params, audio, emotion))
+    depth = jnp.arange(len(seed))[:, None, None] % (config.continued_chunks + 1)
+
+    def proceed(chunk: Int[Array, ""], seed: Float[Array, "B M C"]) -> Float[Array, "B M C"]:
+        before = audio._replace(beat=jnp.roll(audio.beat, chunk + 1, axis=0), emotion=emotion)
+        made = networks.decode(params, before, seed, None, key)[:, -config.seed_frames :]
+        valid = networks.flat(space.valid(networks.pose(made)))
+        return jnp.where(chunk < depth, valid, seed)
+
+    return jax.lax.fori_loop(0, config.continued_chunks, proceed, seed)
 
 
 def _latent(networks: Networks, key: Key[Array, ""], batch: Batch, sampled: bool) -> Float[Array, "B Z"] | None:
@@ -190,6 +221,19 @@ def discriminator_loss(networks: Networks, training: bool, sampled: bool = False
         return sum(terms.values(), start=jnp.zeros(())), terms
 
     return loss
+
+
+def average_loss(params: Params, key: Key[Array, ""], batch: Batch, step: Int[Array, ""]) -> tuple[Array, Terms]:
+    """Zero, with the gradient of half the squared distance of ``average`` from the generator.
+
+    A step of gradient descent at the rate ``1 - decay`` is then one of the exponential moving average. The distance is
+    no loss of the model, and the norm of its gradient is in the log anyway.
+    """
+    del key, batch, step
+    generator = jax.lax.stop_gradient(params["generator"])
+    apart = jax.tree.map(lambda mean, new: jnp.sum(jnp.square(mean - new)), params["average"], generator)
+    half = 0.5 * sum(jax.tree.leaves(apart), start=jnp.zeros(()))
+    return half - jax.lax.stop_gradient(half), {}
 
 
 def vae_loss(networks: Networks) -> Callable[..., tuple[Array, Terms]]:
