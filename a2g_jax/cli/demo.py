@@ -145,7 +145,8 @@ def _side_by_side(options: argparse.Namespace, runs: dict[str, Any], kind: str) 
     speech = demo_speech_with_truth()
     if options.audio is not None:
         sound = read_speech(options.audio, options.channel)
-        words = read_words(options.transcript, options.tier, sound.seconds)
+        seconds = len(sound.samples) / sound.info.sample_rate
+        words = read_words(options.transcript, options.tier, seconds)
         speech = Speech(Path(options.audio).name, sound.at, words)
     with progress_bar(options.samples * len(runs), "generating", "motion") as bar:
         compared = compare(

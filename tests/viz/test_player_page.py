@@ -177,7 +177,7 @@ def test_audio_beyond_full_scale_and_too_quiet_audio_are_scaled_and_the_page_say
     audio = tone(2.0)
     audio = audio * np.float32(peak / np.abs(audio).max())
     page = write(tmp_path, audio=audio, footer="A footer.")
-    with wave.open(io.BytesIO(base64.b64decode(page_data(page)["audio"]))) as file:
+    with wave.open(io.BytesIO(base64.b64decode(page_data(page)["audio"]["data"]))) as file:
         samples = np.frombuffer(file.readframes(-1), "<i2") / 32767
     np.testing.assert_allclose(samples, audio * (played / peak), atol=2e-5)
     footer = re.search(r"<footer>(.*?)</footer>", page)[1]
