@@ -92,7 +92,7 @@ def fit_dynamics(drawn: Motions, recorded: Motions, moved: Moved, fps: float) ->
     levels = _band_levels([np.mean(np.square(bands), axis=-1) for bands in _bands(ours, fps)], fps)
     wanted = _point_levels(recorded, moved, fps)
     wanted_speed = _quantiles([speed_level(one, weight, fps)[:, None] for one in theirs])[0]
-    moving = moved.points.any(axis=1)[:, None]
+    moving = np.any(moved.points != 0.0, axis=1, keepdims=True)
     found = Dynamics(
         mean=mean,
         shift=target - mean,
@@ -114,7 +114,8 @@ def fit_dynamics(drawn: Motions, recorded: Motions, moved: Moved, fps: float) ->
     seconds = sum(len(one) for one in recorded) / fps
     trust = seconds / (seconds + _SECONDS)
     found = replace(found, slow=trust * found.slow, gains=trust * found.gains, speed_gains=trust * found.speed_gains)
-    return replace(found, speed_levels=_speeds(found, ours, fps))
+    found = replace(found, speed_levels=_speeds(found, ours, fps))
+    return Dynamics.of(found.arrays())  # as precise as a stored run
 
 
 def _with_speeds(found: Dynamics, ours: Motions, wanted: np.ndarray, fps: float, steps: int) -> Dynamics:
