@@ -60,6 +60,8 @@ def continue_clips(
         labels = None if emotion is None else emotion[rows]
         poses = draw(params, summary, keys[rows], normalised[rows], pose[rows], labels)
         made.append(np.asarray(poses)[: len(audio) - start])
+        if run.dynamics is not None:
+            made[-1] = np.stack([np.stack([run.finished(one) for one in clip]) for clip in made[-1]])
     return np.concatenate(made)
 
 

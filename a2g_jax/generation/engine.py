@@ -96,7 +96,7 @@ class Engine:
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
             parts = [draw(condition, jnp.int32(start)) for start, condition in conditions]
-            yield np.concatenate([np.asarray(part) for part in parts])[:frames]
+            yield self.run.finished(np.concatenate([np.asarray(part) for part in parts])[:frames])
 
     def _check(self, given: Condition) -> None:
         for name, value in given._asdict().items():
@@ -136,7 +136,7 @@ class Engine:
             for start, condition in windows:
                 pose, state = self._advance(self._params, self._summary, keys, condition, jnp.int32(start), state)
                 parts.append(np.asarray(pose))
-            yield from np.concatenate(parts, axis=1)[: samples - first, :frames]
+            yield from map(self.run.finished, np.concatenate(parts, axis=1)[: samples - first, :frames])
 
     def _windows(self, given: Condition) -> Iterator[tuple[int, Any]]:
         """First frame (context included) and condition of each window."""

@@ -40,5 +40,8 @@ class FineTuning:
     share: float = 1.0
     """Share of the trained weights in those of the new run; the rest are the weights that the training started from.
     Below 1, the motion keeps more of how those move and of their agreement with the speech."""
+    dynamics: bool = False
+    """Whether the new run has gains that bring its motion to the dynamics of the recordings
+    (:mod:`a2g_jax.features.dynamics`); for models whose motion the audio alone decides."""
     keep_constant: bool = False
     """Whether values of poses that are constant in the run's corpus stay constant, for models that leave them out."""

@@ -56,6 +56,7 @@ def start_from(name: str | os.PathLike[str], run: Run) -> Start:
             audio_statistics=tuning.audio_statistics,
             keep_constant=tuning.keep_constant,
             share=tuning.share,
+            dynamics=tuning.dynamics,
         ),
     )
 

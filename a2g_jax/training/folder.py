@@ -62,5 +62,5 @@ def _without_name(source: Any) -> Any:
     """What a run records of its source without the name or path, which may change; the hash of the weights does not."""
     if not isinstance(source, dict):
         return source
-    # Runs of an earlier version record no share.
-    return {"share": 1.0} | {key: value for key, value in source.items() if key != "run"}
+    # Runs of earlier versions record neither.
+    return {"share": 1.0, "dynamics": False} | {key: value for key, value in source.items() if key != "run"}

@@ -28,6 +28,7 @@ from a2g_jax.progress import say
 from a2g_jax.training.averaging import weight_average
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
+from a2g_jax.training.dynamics import corpus_dynamics
 from a2g_jax.training.early_stopping import ended, read_metrics, validations
 from a2g_jax.training.fine_tuning import training_model, with_validation
 from a2g_jax.training.folder import LOCK, check_folder
@@ -82,7 +83,7 @@ def train(
     # Errors are found before anything is written.
     verify_corpus(corpus, verify)
     model = training_model(config)
-    extremes = corpus_extremes(corpus, config)
+    extremes, recordings = corpus_extremes(corpus, config), corpus
     if config.source is not None:
         corpus, note = with_validation(corpus, model.clip_frames)
         if note and progress:
@@ -101,12 +102,13 @@ def train(
     make_folder(out)
     with locked(out / LOCK, f"{out}: is being trained"):
         config = replace(config, body_extremes=extremes)
-        return _train(config, corpus, out, model, shape, resume, progress, start)
+        return _train(config, corpus, recordings, out, model, shape, resume, progress, start)
 
 
 def _train(
     config: RunConfig,
     corpus: Corpus,
+    recordings: Corpus,
     out: Path,
     model: Model,
     shape: ClipShape,
@@ -114,7 +116,11 @@ def _train(
     progress: bool,
     start: Params | None,
 ) -> Run:
-    """Train in a locked folder."""
+    """Train in a locked folder.
+
+    Args:
+        recordings: the corpus with nothing of its training split held out.
+    """
     settings, extremes = config.train_config, config.body_extremes
     spans = stage_spans(model, settings)
     total = spans[-1].stop
@@ -178,9 +184,10 @@ def _train(
     if settings.patience and checked.best not in (None, int(state.step)):
         best = checkpoints.restore(state, checked.best)
         assert best is not None
-        return export(best)
+        return export(best, recordings)
     # A finished run may lack its weights, if it was killed while writing them.
-    return run if run is not None else export(state)
+    adapts = config.source is not None and config.source.dynamics
+    return export(state, recordings) if run is None or adapts else run
 
 
 def _interrupted(out: Path, done: int, total: int) -> Interrupted:
@@ -271,11 +278,17 @@ def _export(
     average: _Average,
     log: MetricsLog,
     state: TrainState,
+    recordings: Corpus | None = None,
 ) -> Run:
-    """Write weights and the latent summary to the run folder, for generation."""
+    """Write weights and the latent summary to the run folder, for generation.
+
+    Args:
+        recordings: of a finished training, whose dynamics its motion takes on if the run says so.
+    """
     params = jax.device_get(finished(model, average(state.params)))
     summary = collect_summary(model, params, corpus, config)
-    run = Run(config, params, summary, int(state.step))
+    dynamics = None if recordings is None else corpus_dynamics(model, config, params, summary, recordings)
+    run = Run(config, params, summary, int(state.step), dynamics)
     save_run(out, run, log.written)
     return run
 

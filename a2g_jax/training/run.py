@@ -14,6 +14,7 @@ from a2g_jax import __version__
 from a2g_jax.config import from_json
 from a2g_jax.data.body_json import body_from_json, body_to_json
 from a2g_jax.errors import InputError, brief
+from a2g_jax.features.dynamics import Dynamics
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
@@ -61,6 +62,8 @@ def weights_bytes(run: Run) -> bytes:
     arrays |= {f"summary/{name}": value for name, value in run.summary.items()}
     for name, statistics in run.config.statistics.items():
         arrays[f"statistics/{name}/mean"], arrays[f"statistics/{name}/std"] = statistics.mean, statistics.std
+    if run.dynamics is not None:
+        arrays |= {f"dynamics/{name}": value for name, value in run.dynamics.arrays().items()}
     return bytes(save({name: np.require(value, requirements="C") for name, value in arrays.items()}))
 
 
@@ -132,6 +135,10 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             found = extremes_from_json(values["body_extremes"], config.body_reference, where)
             config = replace(config, body_extremes=found)
         steps = int(values["steps"])
+        gains = {
+            name.removeprefix("dynamics/"): array for name, array in arrays.items() if name.startswith("dynamics/")
+        }
+        dynamics = Dynamics.of(gains) if gains else None
         if not isinstance(config.corpus, dict):
             raise TypeError("corpus is not an object")
     except InputError as error:
@@ -148,7 +155,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     )
     _check_params(weights, config.build(), params)
     summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
-    return Run(config, params, summary, steps)
+    return Run(config, params, summary, steps, dynamics)
 
 
 def demo_run() -> Run:

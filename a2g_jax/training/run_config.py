@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from a2g_jax.config import check_needs
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
+from a2g_jax.features.dynamics import Dynamics, rows_with_dynamics
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
@@ -53,6 +54,7 @@ class Source:
     audio_statistics: str = "corpus"
     keep_constant: bool = False
     share: float = 1.0
+    dynamics: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,3 +213,10 @@ class Run:
     summary: Summary
     steps: int
     """Training steps of the weights."""
+    dynamics: Dynamics | None = None
+    """Gains of generated motion, of a run that was fine-tuned; None for none."""
+
+    def finished(self, rows: Float[np.ndarray, "T R D"]) -> Float[np.ndarray, "T R D"]:
+        """Poses of a whole generated motion with the run's dynamics: the poses themselves where it has none."""
+        config = self.config
+        return rows if self.dynamics is None else rows_with_dynamics(config.space, rows, self.dynamics, config.fps)

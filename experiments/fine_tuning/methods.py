@@ -1,4 +1,4 @@
-"""What is compared on a part of a take: shipped weights, adapted z-scores, training from scratch, fine-tuning."""
+"""What is compared on a part of a take: shipped weights, adapted statistics, training from scratch, fine-tuning."""
 
 import time
 from collections.abc import Callable
@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from a2g_jax.io.files import read_json, write_json
+from a2g_jax.models.base import Model
 from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.dynamics import corpus_dynamics
 from a2g_jax.training.fine_tuning import start_from, tuned_config, tuned_model, with_validation
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, open_run
@@ -36,11 +38,25 @@ def shipped(name: str, fold: Fold, seed: int, folder: Path) -> Made:
 def adapted(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     """Fine-tuning at step 0: the weights with the z-scores and the summary of the person."""
     del folder
+    return Made(_untrained(name, fold, seed)[0], 0.0)
+
+
+def moved(name: str, fold: Fold, seed: int, folder: Path) -> Made:
+    """The same with the dynamics of the person."""
+    del folder
+    begun = time.process_time()
+    run, model = _untrained(name, fold, seed)
+    dynamics = corpus_dynamics(model, run.config, run.params, run.summary, fold.corpus)
+    return Made(replace(run, dynamics=dynamics), (time.process_time() - begun) / 60.0)
+
+
+def _untrained(name: str, fold: Fold, seed: int) -> tuple[Run, Model]:
     start = start_from(name, open_run(name))
     config = tuned_config(start, *_tuned_settings(start.run, seed), fold.corpus)
     model = tuned_model(config.build(), start.source)
     corpus, _ = with_validation(fold.corpus, model.clip_frames)
-    return Made(Run(config, start.run.params, collect_summary(model, start.run.params, corpus, config), 0), 0.0)
+    summary = collect_summary(model, start.run.params, corpus, config)
+    return Run(config, start.run.params, summary, 0), model
 
 
 def fine_tuned(name: str, fold: Fold, seed: int, folder: Path) -> Made:
@@ -68,6 +84,7 @@ def from_scratch(name: str, fold: Fold, seed: int, folder: Path) -> Made:
 METHODS: dict[str, Method] = {
     "shipped": shipped,
     "z-scores adapted alone": adapted,
+    "z-scores and dynamics alone": moved,
     "from scratch": from_scratch,
     "fine-tuned": fine_tuned,
 }
@@ -75,6 +92,7 @@ METHODS: dict[str, Method] = {
 SETTINGS: dict[str, Callable[[FineTuning], str]] = {
     "shipped": lambda tuning: "",
     "z-scores adapted alone": lambda tuning: repr(replace(tuning, training=TrainConfig())),
+    "z-scores and dynamics alone": lambda tuning: repr(replace(tuning, training=TrainConfig())),
     "from scratch": lambda tuning: str(tuning.training.steps),
     "fine-tuned": repr,
 }

@@ -1,6 +1,7 @@
 """The picture of the guide: every statistic relative to the person's; and film strips, not for publication."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -57,7 +58,8 @@ def draw(path: Path, records: Sequence[Record]) -> None:
 
 
 def strips(path: Path, fold: Fold, campaign: Campaign, seed: int) -> None:
-    """Write film strips of the person, the shipped weights and the fine-tuned ones for a held-out part.
+    """Write film strips of the person, the shipped weights and the fine-tuned ones for a held-out part, the latter also
+    without the person's dynamics.
 
     The person's motion is research-only data: keep the file to yourself.
     """
@@ -66,5 +68,7 @@ def strips(path: Path, fold: Fold, campaign: Campaign, seed: int) -> None:
         made = Generator(run).generate(fold.held_out.audio, 1, seed=0)
         return Row(name, lambda number: [smooth_resample(made[0], fold.corpus.fps)])
 
-    rows = [row(method, campaign.made(fold, method, seed).run) for method in ("shipped", "fine-tuned")]
+    runs = {method: campaign.made(fold, method, seed).run for method in ("shipped", "fine-tuned")}
+    plain = replace(runs["fine-tuned"], dynamics=None)
+    rows = [row(name, run) for name, run in ({"shipped": runs["shipped"], "without dynamics": plain} | runs).items()]
     film_strips(path, fold.held_out, rows)

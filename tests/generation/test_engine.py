@@ -1,9 +1,12 @@
 """The window loop: every field of a condition reaches the windows, cut to their frames."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from a2g_jax.features.dynamics import EDGES, Dynamics
 from a2g_jax.generation.engine import Engine
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Model, Stage, Update
@@ -65,3 +68,48 @@ def test_windows_hold_their_frames(toy_run_config, window, monkeypatch):
     np.testing.assert_allclose(rows[:, 0, 2], ramp, atol=0.01)
     assert set(rows[:, 0, 3]) == {3.0}
     assert set(rows[:, 0, 4]) == {7.0}
+
+
+def test_gains_of_a_run_act_on_the_whole_motion(toy_run_config, monkeypatch):
+    """Whatever the windows, they are those of the motion in one piece, and another sample does not matter."""
+
+    def build(config):
+        model = recorder(config.space)
+        # The last value counts the frames of a window.
+        return model._replace(sample=lambda *given: model.sample(*given).at[:, 0, 5].set(1.0))
+
+    monkeypatch.setattr(RunConfig, "build", build)
+    monkeypatch.setattr(PoseSpace, "valid", lambda space, pose: pose)
+    config = toy_run_config()
+    rows, width = config.space.shape
+    levels = np.broadcast_to(np.linspace(-3.0, 3.0, 4), (len(EDGES), rows, 4))
+    ones = np.ones((rows, width))
+    gains = Dynamics(
+        mean=0.1 * ones,
+        shift=0.02 * ones,
+        std=ones,
+        weight=np.ones(rows),
+        slow=np.full(rows, 0.2),
+        levels=levels,
+        gains=levels * 0.2,
+        speed_levels=levels[0, 0],
+        speed_gains=np.array([-1.0, -0.5, 0.0, 0.0]),
+    )
+    ramp = np.linspace(0.2, 1.0, FRAMES, dtype=np.float32)
+    given = Condition(
+        audio=np.zeros((FRAMES, config.mel.width), np.float32),
+        waveform=np.zeros(round(FRAMES * RATE), np.float32),
+        emotion=np.stack([1.0 - ramp, ramp + 0.3 * np.sin(ramp * 60.0)], axis=-1),
+        speaker=np.int32(1),
+        words=np.ones(FRAMES, np.int32),
+        seed_poses=np.full((5, *config.space.shape), 0.5, np.float32),
+    )
+    plain = Run(config, {}, {}, 0)
+    run = dataclasses.replace(plain, dynamics=gains)
+    (whole,) = Engine(run, 512).rows(given, 1)
+    parts = list(Engine(run, 128).rows(given, 2))
+    np.testing.assert_allclose(parts[0], whole, atol=1e-5)
+    (before,) = Engine(plain, 512).rows(given, 1)
+    assert before.shape == whole.shape
+    np.testing.assert_allclose(whole, run.finished(before), atol=1e-5)
+    assert np.abs(whole - before).max() > 0.1

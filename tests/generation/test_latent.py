@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from a2g_jax.errors import InputError
+from a2g_jax.features.dynamics import EDGES, Dynamics
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace
 from a2g_jax.generation.generator import Generator
 from a2g_jax.talker.recordings import talk
@@ -31,6 +32,28 @@ def test_codes_decode_to_what_generation_gives(speech, controls):
     motion = space.to_motion(space.from_audio(speech.audio, seed=5, sample=1))
     assert motion.frames == generated.frames
     np.testing.assert_allclose(motion.rotations, generated.rotations, atol=2e-4)
+
+
+def test_decoded_codes_have_the_gains_of_the_run(speech):
+    rows = demo_run().config.space.rows
+    levels = np.broadcast_to(np.linspace(-3.0, 3.0, 4), (len(EDGES), rows, 4))
+    gains = Dynamics(
+        mean=np.zeros((rows, 6)),
+        shift=np.zeros((rows, 6)),
+        std=np.ones((rows, 6)),
+        weight=np.ones(rows),
+        slow=np.full(rows, 0.1),
+        levels=levels,
+        gains=np.full_like(levels, 0.4),
+        speed_levels=levels[0, 0],
+        speed_gains=np.zeros(4),
+    )
+    run = replace(demo_run(), dynamics=gains)
+    space = LatentSpace(run)
+    (generated,) = Generator(run).generate(speech.audio, 1, seed=5)
+    codes = space.from_audio(speech.audio, seed=5)
+    np.testing.assert_allclose(space.to_motion(codes).rotations, generated.rotations, atol=1e-3)
+    assert np.abs(LatentSpace(demo_run()).to_motion(codes).rotations - generated.rotations).max() > 0.05
 
 
 def test_a_motion_comes_back(space, speech):

@@ -13,11 +13,13 @@ import pytest
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.generation.generator import Generator
 from a2g_jax.inspection.runs import check_run
 from a2g_jax.models import find_model
 from a2g_jax.training import early_stopping, loop
 from a2g_jax.training import start as starting
 from a2g_jax.training.checkpoint import Checkpoints
+from a2g_jax.training.dynamics import corpus_dynamics
 from a2g_jax.training.fine_tuning import (
     adapted_statistics,
     check_fits,
@@ -31,6 +33,7 @@ from a2g_jax.training.fine_tuning import (
 from a2g_jax.training.folder import check_folder
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, load_run, open_run, save_run
+from a2g_jax.training.run_file import WEIGHTS_FILE
 
 NETWORKS = ("audio_encoder", "decoder", "mapping_net", "motion_encoder")
 
@@ -91,10 +94,16 @@ def test_resuming_a_tuned_run_is_exact(tmp_path, tuned, toy_corpus, monkeypatch)
     monkeypatch.setattr(loop.MetricsLog, "tick", tick)
     with pytest.raises(Interrupted):
         train(config, toy_corpus, half, resume=False, progress=False, start=params)
+    assert load_run(half).dynamics is None
     monkeypatch.undo()
     resumed = train(config, toy_corpus, half, resume=True, progress=False, start=params)
     assert equal_trees(whole.params, resumed.params)
     assert whole.steps == resumed.steps
+    # Gains are measured when training has ended, and stored with the weights.
+    assert whole.dynamics is not None
+    for found in (resumed, load_run(half)):
+        assert equal_trees(whole.dynamics.arrays(), found.dynamics.arrays())
+    assert (half / WEIGHTS_FILE).read_bytes() == (tmp_path / "whole" / WEIGHTS_FILE).read_bytes()
     assert (half / "metrics.jsonl").read_text() == (tmp_path / "whole" / "metrics.jsonl").read_text()
     # The source is part of what must stay.
     plain = dataclasses.replace(config, source=None)
@@ -280,3 +289,27 @@ def test_gains_of_controls_are_not_those_of_the_source(name, source, toy_corpus)
     start = start_from(source, dataclasses.replace(run, config=dataclasses.replace(run.config, sampling=other)))
     config = tuned_config(start, run.config.model_config, run.config.train_config, toy_corpus)
     assert config.sampling == dataclasses.replace(other, control_gains=())
+
+
+def test_no_gains_without_a_source_or_recordings(tuned, toy_run_config, toy_corpus):
+    config, params = tuned()
+    model = training_model(config)
+    assert corpus_dynamics(model, toy_run_config(), params, {}, toy_corpus) is None
+    assert config.source is not None
+    other = dataclasses.replace(config, source=dataclasses.replace(config.source, dynamics=False))
+    assert corpus_dynamics(model, other, params, {}, toy_corpus) is None
+    short = dataclasses.replace(toy_corpus, splits={"train": [Segment(0, 0, 40)]})
+    assert corpus_dynamics(model, config, params, {}, short) is None
+
+
+def test_motion_of_a_tuned_run_has_the_dynamics_of_the_recordings(tmp_path, tuned, toy_corpus):
+    """Amplitude of motion for the speech of the recordings; that of the toy run is far from theirs."""
+    config, params = tuned(steps=5)
+    run = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False, start=params)
+    segment = toy_corpus.segments("train")[0]
+    audio, pose = (np.asarray(toy_corpus.array(name)[segment.start : segment.stop]) for name in ("audio", "pose"))
+    spread = {}
+    for name, one in (("plain", dataclasses.replace(run, dynamics=None)), ("tuned", run)):
+        (rows,) = Generator(one).rows(np.asarray(audio, np.float32), 1)
+        spread[name] = abs(float(np.log(rows.std(axis=0).mean() / pose.std(axis=0).mean())))
+    assert spread["tuned"] < 0.7 * spread["plain"]

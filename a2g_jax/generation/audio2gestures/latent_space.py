@@ -14,6 +14,7 @@ from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import plant_rotations, speech_features
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edits import apply_edits, parse_edit
@@ -85,7 +86,7 @@ class LatentSpace:
             return codec.to_frames(shared.mean), codec.specific_to_frames(specific.mean)
 
         self._draw, self._encode = jax.jit(draw), jax.jit(encode)
-        self._write = space.from_rotations
+        self._write, self._space = space.from_rotations, space
         self._decode = jax.jit(lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None])[0]))
 
     def from_audio(self, audio: Any, seed: int = 0, sample: int = 0, *, sample_rate: int | None = None) -> Codes:
@@ -125,9 +126,11 @@ class LatentSpace:
         return Codes(shared[0], specific[0], self._context, len(pose))
 
     def to_motion(self, codes: Codes) -> Motion:
-        """The decoded motion g(S, I), with a root that plants the feet."""
-        stop = codes.context + codes.frames
+        """The decoded motion g(S, I) with the run's dynamics, and a root that plants the feet."""
+        stop, space = codes.context + codes.frames, self._run.config.space
         rotations = np.asarray(self._decode(self._params, codes.shared, codes.specific))[codes.context : stop]
+        if self._run.dynamics is not None:
+            rotations = rotations_from_rows(self._run.finished(space.write(rotations)), space.kind)
         return plant_rotations(self._run, rotations)
 
     def edit(self, codes: Codes, *edits: str, other: Codes | None = None) -> Codes:

@@ -31,6 +31,7 @@ _FINE_TUNING = FineTuning(
     stages=("adversarial",),
     audio_statistics="run",
     share=0.6,
+    dynamics=True,
 )
 
 ENTRY = Entry(
