@@ -162,7 +162,8 @@ def compare(
     # This removes the talker's motion of an earlier speech, also where this one has none.
     stems = tuple(dict.fromkeys((*_stems_before(Path(out)), "sample", TALKER, *runs)))
     figures = [] if speech.truth is None else [speech.truth]
-    with MotionFiles(out, stems, formats, REPORTS) as files:
+    sound = (audio[first.mel.sample_rate], first.mel.sample_rate)
+    with MotionFiles(out, stems, formats, REPORTS, speech=sound) as files:
         for name, made in motions.items():
             for number, motion in enumerate(made):
                 files.write(number, motion, name)
