@@ -14,6 +14,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.retarget import Rig, find_rig
 from a2g_jax.geometry.retarget.parts import find_parts
+from a2g_jax.geometry.retarget.poses import rotation_angle
 from a2g_jax.geometry.retarget.rest import oddness
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.gltf.buffers import read_matrices
@@ -23,6 +24,8 @@ from a2g_jax.io.gltf.vrm import humanoid_nodes
 
 #: Oddness (degrees) up to which the pose that a skin was bound in is the rest pose, and of any pose.
 _BOUND, _WORST = 40.0, 75.0
+#: Largest turn (degrees) of a pose of the nodes from the one that the skin was bound in.
+_NEAR = 44.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,12 +128,27 @@ def _bound_pose(glb: Glb, nodes: list[Node], members: list[int], where: Placed) 
     for node in members:
         up = nodes[node].parent
         if up not in found:
-            found[node] = where.rotations[node]
+            found[node] = _first(nodes[node], matrices.get(node), where)
         elif up in matrices and node in matrices:
             found[node] = found[up] @ matrices[up].T @ matrices[node]
         else:
             found[node] = found[up] @ nodes[node].rotation
     return found
+
+
+def _first(node: Node, bound: Float[np.ndarray, "3 3"] | None, where: Placed) -> Float[np.ndarray, "3 3"]:
+    """The orientation of the first joint in the world when it was bound.
+
+    Skins are bound in the world or in the space of the node above all joints, whichever is nearer to the pose of the
+    nodes, which may be one of an animation. If neither is near, the joint is as its node is.
+    """
+    shown = where.rotations[node.index]
+    if bound is None:
+        return shown
+    spaces = [np.eye(3)] + ([where.rotations[node.parent]] if node.parent >= 0 else [])
+    turns = [space @ bound for space in spaces]
+    away = [float(rotation_angle(turn, shown)) for turn in turns]
+    return turns[int(np.argmin(away))] if min(away) < _NEAR else shown
 
 
 def _orientation(inverse: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "3 3"] | None:

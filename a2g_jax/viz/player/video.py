@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -145,17 +145,14 @@ def _encoder(path: Path, fps: float, speech: Path | None) -> Iterator[IO[bytes]]
         process = subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE, stderr=errors)
         assert process.stdin is not None
         try:
-            yield process.stdin
-        except BrokenPipeError:
-            pass
+            with suppress(BrokenPipeError):  # its exit status says that ffmpeg has stopped
+                yield process.stdin
+            with suppress(BrokenPipeError):
+                process.stdin.close()
         except BaseException:
             process.kill()
             process.wait()
             raise
-        try:
-            process.stdin.close()
-        except BrokenPipeError:
-            pass
         if process.wait():
             errors.seek(0)
             reason = " ".join(errors.read(2000).decode("utf-8", "replace").split())[:300]
