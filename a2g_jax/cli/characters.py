@@ -97,7 +97,7 @@ def lines(made: "Delivery", run: "Run") -> list[str]:
         return []
     rig = match.target
     moved = {pair.target for pair in match.pairs} | {share.target for share in match.shares}
-    fingers = [joint for role, joint in rig.roles.items() if role[-1:].isdigit() and joint not in moved]
+    fingers = [joint for role, joint in rig.roles.items() if role[-1:] in "123" and joint not in moved]
     text = f"{made.character.path}: {len(moved)} of {rig.skeleton.joints} joints move"
     if fingers:
         text += f", {len(fingers)} of fingers are {'relaxed' if match.still is not None else 'as in the rest pose'}"

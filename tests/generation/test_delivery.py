@@ -120,9 +120,10 @@ def test_nothing_is_done_by_default(motion):
     assert PLAIN.match(motion.skeleton) is None
 
 
-@pytest.mark.parametrize(
-    ("direction", "axis"), [("+z", (0, 0, 1)), ("-z", (0, 0, -1)), ("+x", (1, 0, 0)), ("-x", (-1, 0, 0))]
-)
+DIRECTIONS = {"+z": (0, 0, 1), "-z": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0)}
+
+
+@pytest.mark.parametrize(("direction", "axis"), DIRECTIONS.items())
 def test_facing(motion, direction, axis):
     turned = facing(motion, direction)
     hips = [motion.skeleton.index(f"{side}_Hip") for side in "LR"]
