@@ -1,18 +1,13 @@
 """The flags of ``a2g generate`` for a character."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parent / "io" / "gltf"))
-from decoding import Decoded
 
 from a2g_jax.cli import main
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.talker.recordings import talk
+from experiments.characters.decoded import Decoded
 from experiments.characters.rigs import unreal
 from experiments.characters.skinned import mixamo_glb
 

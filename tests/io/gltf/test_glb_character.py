@@ -3,14 +3,10 @@
 import json
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.append(str(Path(__file__).parent))
-from decoding import Decoded
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.delivery import Delivery
@@ -23,6 +19,7 @@ from a2g_jax.io.gltf.nodes import read_nodes
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.viz.mannequin_glb import write_mannequin_glb
+from experiments.characters.decoded import Decoded
 from experiments.characters.skinned import SKINNED, mixamo_glb
 
 

@@ -1,4 +1,4 @@
-"""A decoder of GLB files for tests, which shares no code with the package."""
+"""A decoder of GLB files, which shares no code with the package."""
 
 import json
 import struct
@@ -91,3 +91,11 @@ class Decoded:
     def places(self, time: float, tracks=None) -> dict[str, np.ndarray]:
         """Positions of the nodes by name."""
         return {name: row[:3, 3] for name, row in zip(self.names, self.world(time, tracks), strict=True)}
+
+
+def joint_places(path: Path, names: tuple[str, ...], frames: int, fps: float) -> np.ndarray:
+    """Positions (T, J, 3) of nodes by name over the first animation of a file."""
+    decoded = Decoded(path)
+    tracks = decoded.tracks()
+    rows = [decoded.places(frame / fps, tracks) for frame in range(frames)]
+    return np.array([[row[name] for name in names] for row in rows])
