@@ -1,5 +1,7 @@
 """The flags of ``a2g generate`` for a character."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,15 @@ def test_retarget_to_a_skinned_character(files, tmp_path, capsys):
     assert main([*flags, str(tmp_path / "x.glb"), "--fingers", "relaxed", "--fps", "24"]) == 0
     assert "mixamorig:LeftForeArm" in capsys.readouterr().out
     assert len(Decoded(tmp_path / "x.glb").document["animations"]) == 1
+
+
+GUIDE = Path(__file__).parents[1] / "docs" / "character.md"
+COMMANDS = [line.split("#")[0].split()[1:] for line in GUIDE.read_text().splitlines() if line.startswith("a2g ")]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_commands_of_the_guide_have_flags_that_there_are(command, tmp_path, monkeypatch, capsys):
+    """Their files do not exist here, which is what is said."""
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 2
+    assert "there is no such file" in capsys.readouterr().err

@@ -8,11 +8,13 @@ skeleton. Writes ``characters.md`` and, with a Chromium, ``characters.png`` and 
 """
 
 import argparse
+import io
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from a2g_jax import Generator, demo_run, read_audio
 from a2g_jax.generation.checked import Checked
@@ -22,19 +24,19 @@ from a2g_jax.io.bvh import read_with_layout
 from a2g_jax.io.character import Character, read_character
 from a2g_jax.io.files import atomic_path
 from a2g_jax.talker.demo_speech import demo_speech
-from a2g_jax.viz.player import Figure, screenshot_page, write_page
+from a2g_jax.viz.player import Figure, write_page
+from a2g_jax.viz.player.video import page_pictures
 from experiments.characters.decoded import joint_places
 from experiments.characters.rigs import EXPORTERS
 from experiments.characters.skinned import SKINNED
 
 #: Frames per second of the files, and seconds of speech.
 FPS, SECONDS = 24.0, 6.0
+#: Figures of a row of the picture.
+_ABREAST = 7
+#: Width and height of a row, pixels.
+_PIXELS = (1120, 400)
 _BONES = (("Shoulder", "Elbow"), ("Elbow", "Wrist"), ("Hip", "Knee"), ("Knee", "Ankle"))
-_STYLE = """
-const style = document.createElement("style");
-style.textContent = "#panel, header, #views { display: none !important; }";
-document.head.append(style);
-"""
 
 
 @dataclass(frozen=True)
@@ -72,15 +74,30 @@ def main() -> None:
         options.out.mkdir(parents=True, exist_ok=True)
         with atomic_path(options.out / "characters.md") as temporary:
             temporary.write_text(table(rows, options.seed), encoding="utf-8")
-        page = Path(folder) / "page.html"
-        write_page(page, figures, np.zeros(0, np.float32), 16000, title="Characters")
-        picture = options.pictures / "characters.png"
-        screenshot_page(page, picture, width=1600, height=760, time=options.time, script=_STYLE)
+        rows_of_figures = [figures[at : at + _ABREAST] for at in range(0, len(figures), _ABREAST)]
+        pictured(options.pictures / "characters.png", rows_of_figures, options.time)
         hands = [figures[index] for index in (5, 8, 10)]
-        write_page(page, hands, np.zeros(0, np.float32), 16000, title="Hands")
-        near = _STYLE + "a2gPlayer.view({ zoom: 2.2 });"
-        screenshot_page(page, options.pictures / "hands.png", width=1200, height=500, time=options.time, script=near)
+        near = "a2gPlayer.view({ zoom: 1.9, panY: 0.12 });"
+        pictured(options.pictures / "hands.png", [hands], options.time, near)
     print(f"{options.out}: characters.md; {options.pictures}: characters.png, hands.png")
+
+
+def pictured(path: Path, rows: list[list[Figure]], time: float, script: str = "") -> None:
+    """Pages with a row of figures each, below each other: one page with all of them is slow to draw without a GPU."""
+    shots = []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, figures in enumerate(rows):
+            page = Path(folder) / f"{number}.html"
+            write_page(page, figures, np.zeros(0, np.float32), 16000, title="Characters")
+            (picture,) = page_pictures(page, [time], *_PIXELS, script)
+            with Image.open(io.BytesIO(picture)) as image:
+                shots.append(image.convert("RGB").resize(_PIXELS, Image.Resampling.LANCZOS))
+    whole = Image.new("RGB", (shots[0].width, sum(shot.height for shot in shots)))
+    for at, shot in enumerate(shots):
+        whole.paste(shot, (0, at * shots[0].height))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_path(path) as temporary:
+        whole.quantize(256).save(temporary, optimize=True)
 
 
 def generated(audio: Path | None, seed: int) -> Motion:

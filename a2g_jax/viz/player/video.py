@@ -5,7 +5,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -102,25 +102,36 @@ def write_video(
             speech = Path(folder) / "speech.wav"
             write_audio(speech, sound, sample_rate)
         with _encoder(temporary, motion.fps, speech) as pictures:
-            for picture in _pictures(page, motion.frames, motion.fps):
+            for picture in page_pictures(page, np.arange(motion.frames) / motion.fps):
                 pictures.write(picture)
 
 
-def _pictures(page: Path, frames: int, fps: float) -> Iterator[bytes]:
-    """Every frame of a page, as JPEG."""
+def page_pictures(
+    page: Path, times: Iterable[float], width: int = SIZE, height: int = SIZE, script: str = ""
+) -> Iterator[bytes]:
+    """The figures of a page at some moments, as JPEG.
+
+    Args:
+        times: seconds.
+        script: JavaScript to run first, such as ``a2gPlayer.view({yaw: 0.6})``.
+
+    Raises:
+        InputError: the browser fails.
+    """
     from playwright.sync_api import Error, sync_playwright
 
     with sync_playwright() as playwright:
         try:
             browser = playwright.chromium.launch(executable_path=find_browser(), args=list(BROWSER_ARGUMENTS))
             try:
-                view = browser.new_page(viewport={"width": SIZE // 2, "height": SIZE // 2}, color_scheme="light")
+                view = browser.new_page(viewport={"width": width // 2, "height": height // 2}, color_scheme="light")
                 view.goto(page.resolve().as_uri())
                 view.evaluate("a2gPlayer.ready")
                 view.evaluate(_STYLE)
+                view.evaluate(f"() => {{ {script} }}")
                 view.evaluate("a2gPlayer.still()")
-                for frame in range(frames):
-                    yield base64.b64decode(view.evaluate(_FRAME, frame / fps))
+                for time in times:
+                    yield base64.b64decode(view.evaluate(_FRAME, float(time)))
             finally:
                 browser.close()
         except Error as error:
