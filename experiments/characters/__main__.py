@@ -4,7 +4,8 @@
 
 A few seconds of ``a2g generate demo`` are written for every character as ``a2g generate --to`` does, read back, and
 compared with the motion: places of the joints in the files, and directions of arms and legs against the run's own
-skeleton. Writes ``characters.md`` and, with a Chromium, ``characters.png`` and ``hands.png``.
+skeleton. Writes ``characters.md``, ``skinned.png``
+and, with a Chromium, ``characters.png`` and ``hands.png``.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from a2g_jax import Generator, demo_run, read_audio
 from a2g_jax.generation.checked import Checked
@@ -27,15 +28,16 @@ from a2g_jax.talker.demo_speech import demo_speech
 from a2g_jax.viz.player import Figure, write_page
 from a2g_jax.viz.player.video import page_pictures
 from experiments.characters.decoded import joint_places
+from experiments.characters.drawn import draw_row
 from experiments.characters.rigs import EXPORTERS
 from experiments.characters.skinned import SKINNED
 
 #: Frames per second of the files, and seconds of speech.
 FPS, SECONDS = 24.0, 6.0
 #: Figures of a row of the picture.
-_ABREAST = 7
-#: Width and height of a row, pixels.
-_PIXELS = (1120, 400)
+_ABREAST = 6
+#: Width and height of a figure's picture, pixels.
+_PIXELS = (240, 320)
 _BONES = (("Shoulder", "Elbow"), ("Elbow", "Wrist"), ("Hip", "Knee"), ("Knee", "Ankle"))
 
 
@@ -63,7 +65,7 @@ def main() -> None:
     parser.add_argument("--time", type=float, default=3.0, help="of the pictures, seconds")
     options = parser.parse_args()
     motion = generated(options.audio, options.seed)
-    rows, figures = [], [Figure(motion, "the run's own")]
+    rows, figures = [], []
     with tempfile.TemporaryDirectory() as folder:
         for path in write_characters(Path(folder)):
             character = read_character(path)
@@ -74,27 +76,30 @@ def main() -> None:
         options.out.mkdir(parents=True, exist_ok=True)
         with atomic_path(options.out / "characters.md") as temporary:
             temporary.write_text(table(rows, options.seed), encoding="utf-8")
-        rows_of_figures = [figures[at : at + _ABREAST] for at in range(0, len(figures), _ABREAST)]
-        pictured(options.pictures / "characters.png", rows_of_figures, options.time)
-        hands = [figures[index] for index in (5, 8, 10)]
-        near = "a2gPlayer.view({ zoom: 1.9, panY: 0.12 });"
-        pictured(options.pictures / "hands.png", [hands], options.time, near)
+        files = [(Path(folder) / f"out_{Path(name).stem}.glb", name == "vrm_0.vrm") for name in SKINNED]
+        with atomic_path(options.pictures / "skinned.png") as temporary:
+            draw_row(files, options.time).quantize(256).save(temporary, optimize=True)
+        pictured(options.pictures / "characters.png", figures, options.time)
+        near = "a2gPlayer.view({ zoom: 2.4, panY: 0.2 });"
+        pictured(options.pictures / "hands.png", [figures[index] for index in (4, 7, 9)], options.time, near)
     print(f"{options.out}: characters.md; {options.pictures}: characters.png, hands.png")
 
 
-def pictured(path: Path, rows: list[list[Figure]], time: float, script: str = "") -> None:
-    """Pages with a row of figures each, below each other: one page with all of them is slow to draw without a GPU."""
+def pictured(path: Path, figures: list[Figure], time: float, script: str = "") -> None:
+    """Figures side by side, each drawn by a page of its own: together they are slow to draw without a GPU."""
     shots = []
     with tempfile.TemporaryDirectory() as folder:
-        for number, figures in enumerate(rows):
-            page = Path(folder) / f"{number}.html"
-            write_page(page, figures, np.zeros(0, np.float32), 16000, title="Characters")
+        page = Path(folder) / "page.html"
+        for figure in figures:
+            write_page(page, [figure], np.zeros(0, np.float32), 16000, title="")
             (picture,) = page_pictures(page, [time], *_PIXELS, script)
             with Image.open(io.BytesIO(picture)) as image:
                 shots.append(image.convert("RGB").resize(_PIXELS, Image.Resampling.LANCZOS))
-    whole = Image.new("RGB", (shots[0].width, sum(shot.height for shot in shots)))
+            ImageDraw.Draw(shots[-1]).text((8, 6), figure.label, fill=(60, 70, 85), font_size=15)
+    across = min(len(shots), _ABREAST)
+    whole = Image.new("RGB", (_PIXELS[0] * across, _PIXELS[1] * -(-len(shots) // across)))
     for at, shot in enumerate(shots):
-        whole.paste(shot, (0, at * shots[0].height))
+        whole.paste(shot, (at % across * _PIXELS[0], at // across * _PIXELS[1]))
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
         whole.quantize(256).save(temporary, optimize=True)
@@ -164,7 +169,7 @@ def table(rows: list[Row], seed: int) -> str:
         "|---|---|---|---|---|---|",
     ]
     lines += [
-        f"| {row.name} | {row.joints} | {row.moved} | {row.fingers} | {row.millimetres:.3f} | {row.degrees:.1f} |"
+        f"| {row.name} | {row.joints} | {row.moved} | {row.fingers} | {row.millimetres:.4f} | {row.degrees:.2f} |"
         for row in rows
     ]
     return "\n".join(lines) + "\n"
