@@ -83,7 +83,7 @@ def format_names() -> tuple[str, ...]:
 
 def known_formats() -> tuple[str, ...]:
     """Names of all formats that can be requested: :func:`format_names` and :data:`MORE_FORMATS`."""
-    return (*format_names()[:-1], *MORE_FORMATS, PAGE)
+    return (*format_names(), *MORE_FORMATS)
 
 
 def motion_format(name: str) -> MotionFormat | None:

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.io.gltf.container import write_glb
 from a2g_jax.io.gltf.figure import Above, figure_document
 from a2g_jax.viz.mannequin_mesh import mannequin_surfaces
+from experiments.characters.exporter import Exporter, with_names
 from experiments.characters.person import Stance
-from experiments.characters.rigs import Exporter, mixamo, vroid, with_names
+from experiments.characters.rigs import mixamo, vroid
 
 #: Parts of the body by the humanoid bones of VRM.
 _HUMANOID = {
