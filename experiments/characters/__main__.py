@@ -36,8 +36,8 @@ from experiments.characters.skinned import SKINNED
 FPS, SECONDS = 24.0, 6.0
 #: Figures of a row of the picture.
 _ABREAST = 6
-#: Width and height of a figure's picture, pixels.
-_PIXELS = (240, 320)
+#: Width and height of a figure's picture, and as the page draws it, pixels.
+_PIXELS, _DRAWN = (240, 320), (360, 480)
 _BONES = (("Shoulder", "Elbow"), ("Elbow", "Wrist"), ("Hip", "Knee"), ("Knee", "Ankle"))
 
 
@@ -79,20 +79,20 @@ def main() -> None:
         files = [(Path(folder) / f"out_{Path(name).stem}.glb", name == "vrm_0.vrm") for name in SKINNED]
         with atomic_path(options.pictures / "skinned.png") as temporary:
             draw_row(files, options.time).quantize(256).save(temporary, optimize=True)
-        pictured(options.pictures / "characters.png", figures, options.time)
-        near = "a2gPlayer.view({ zoom: 2.4, panY: 0.2 });"
+        pictured(options.pictures / "characters.png", figures, options.time, "a2gPlayer.view({ zoom: 1.8 });")
+        near = "a2gPlayer.view({ zoom: 3.3, panY: 0.2 });"
         pictured(options.pictures / "hands.png", [figures[index] for index in (4, 7, 9)], options.time, near)
     print(f"{options.out}: characters.md; {options.pictures}: characters.png, hands.png")
 
 
-def pictured(path: Path, figures: list[Figure], time: float, script: str = "") -> None:
+def pictured(path: Path, figures: list[Figure], time: float, script: str) -> None:
     """Figures side by side, each drawn by a page of its own: together they are slow to draw without a GPU."""
     shots = []
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.html"
         for figure in figures:
             write_page(page, [figure], np.zeros(0, np.float32), 16000, title="")
-            (picture,) = page_pictures(page, [time], *_PIXELS, script)
+            (picture,) = page_pictures(page, [time], *_DRAWN, script)
             with Image.open(io.BytesIO(picture)) as image:
                 shots.append(image.convert("RGB").resize(_PIXELS, Image.Resampling.LANCZOS))
             ImageDraw.Draw(shots[-1]).text((8, 6), figure.label, fill=(60, 70, 85), font_size=15)

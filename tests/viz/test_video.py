@@ -66,7 +66,7 @@ def test_a_missing_program_is_named_with_the_remedy(program, tmp_path, monkeypat
 def test_an_encoder_that_fails_is_an_error_and_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(video, "check_video", lambda: None)
     monkeypatch.setattr(video, "find_ffmpeg", lambda: "false")
-    monkeypatch.setattr(video, "page_pictures", lambda page, times: iter([b"x" * 100_000] * len(times)))
+    monkeypatch.setattr(video, "page_pictures", lambda page, times, script: iter([b"x" * 100_000] * len(times)))
     with pytest.raises(InputError, match="ffmpeg could not encode"):
         video.write_video(tmp_path / "film.mp4", standing(), (), 16_000)
     assert list(tmp_path.iterdir()) == []

@@ -26,6 +26,8 @@ SIZE = 720
 #: Most frames of a film: ten minutes at 30 frames a second. A frame takes a tenth of a second or more to draw.
 MOST_FRAMES = 18_000
 _INSTALL = "install both with: pip install 'a2g_jax[video]'"
+#: The page leaves room for its labels, which a film has not.
+_NEAR = "a2gPlayer.view({ zoom: 1.35 });"
 #: The figure alone.
 _STYLE = """() => {
   const style = document.createElement("style");
@@ -102,7 +104,7 @@ def write_video(
             speech = Path(folder) / "speech.wav"
             write_audio(speech, sound, sample_rate)
         with _encoder(temporary, motion.fps, speech) as pictures:
-            for picture in page_pictures(page, np.arange(motion.frames) / motion.fps):
+            for picture in page_pictures(page, np.arange(motion.frames) / motion.fps, script=_NEAR):
                 pictures.write(picture)
 
 
