@@ -9,6 +9,7 @@ __version__ = "0.2.0"
 # names for editors and type checkers.
 _EXPORTS = {
     "Corpus": "a2g_jax.data.corpus",
+    "Delivery": "a2g_jax.generation.delivery",
     "EmotionSpace": "a2g_jax.generation.emotion_gesture.emotion_space",
     "Figure": "a2g_jax.viz.player.figure",
     "FlowSpace": "a2g_jax.generation.stylized_flow.latent_space",
@@ -38,6 +39,7 @@ _EXPORTS = {
     "open_run": "a2g_jax.training.run",
     "read_audio": "a2g_jax.io.audio",
     "read_bvh": "a2g_jax.io.bvh_reader",
+    "read_character": "a2g_jax.io.character",
     "read_motion_npz": "a2g_jax.io.npz",
     "resample_motion": "a2g_jax.talker.recordings",
     "retarget": "a2g_jax.geometry.retarget.transfer",

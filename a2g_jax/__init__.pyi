@@ -5,6 +5,7 @@ from a2g_jax.evaluation.evaluate import evaluate as evaluate
 from a2g_jax.features.mel import log_mel as log_mel
 from a2g_jax.generation.audio2gestures.latent_space import LatentSpace as LatentSpace
 from a2g_jax.generation.controls import control_rows as control_rows
+from a2g_jax.generation.delivery import Delivery as Delivery
 from a2g_jax.generation.emotion_gesture.emotion_space import EmotionSpace as EmotionSpace
 from a2g_jax.generation.export import export as export
 from a2g_jax.generation.generator import Generator as Generator
@@ -22,6 +23,7 @@ from a2g_jax.io.audio import read_audio as read_audio
 from a2g_jax.io.audio import write_audio as write_audio
 from a2g_jax.io.bvh_reader import read_bvh as read_bvh
 from a2g_jax.io.bvh_writer import write_bvh as write_bvh
+from a2g_jax.io.character import read_character as read_character
 from a2g_jax.io.npz import read_motion_npz as read_motion_npz
 from a2g_jax.io.npz import write_motion_npz as write_motion_npz
 from a2g_jax.metrics.body.check import check_motion as check_motion

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from a2g_jax.cli import clips, sampling
+from a2g_jax.cli import characters, clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.cli.speech import read_speech, read_words
@@ -34,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--settings", action="store_true", help="list the sampling settings, and exit")
     clips.add_arguments(parser)
     sampling.add_arguments(parser)
+    parser.set_defaults(formats=None)  # the character decides
+    characters.add_arguments(parser)
 
 
 def run(options: argparse.Namespace, extra: list[str]) -> None:
@@ -57,6 +59,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     clips.check_flags(options, extra)
     existing_file(options.audio)
     existing_file(options.transcript)
+    characters.check(options)
     clips.check_files(options)
     writable_folder(options.out)
 
@@ -64,15 +67,22 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     from a2g_jax.training.run import open_run
 
     keep_compilations()
+    delivery = characters.delivery(options)
     opened = open_run(options.run)
     trained = replace(opened, config=replace(opened.config, sampling=settings))
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
+    for line in characters.lines(delivery, trained):
+        print(line)
     rate = trained.config.mel.sample_rate
     audio = read_speech(options.audio, options.channel).at(rate)
     words = read_words(options.transcript, options.tier, len(audio) / rate)
     chosen = clips.sampler_of(trained, audio, options)
     parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))
     about = {**chosen.about, "label": ", ".join(part for part in parts if part), "words": words}
-    sampling.write_samples(trained, chosen.sampler, audio, options, Path(options.audio).name, **about)
+    sampling.write_samples(
+        trained, chosen.sampler, audio, options, Path(options.audio).name, delivery=delivery, **about
+    )
+    for line in delivery.lines():
+        print(line)
     for line in chosen.report(Path(options.out)):
         print(line)

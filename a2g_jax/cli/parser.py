@@ -33,6 +33,10 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(allow_abbrev=False, **options)
 
+    def _parse_optional(self, arg_string: str) -> Any:
+        # An axis such as -z is the value of a flag, not a flag.
+        return None if arg_string in ("-x", "-y", "-z") else super()._parse_optional(arg_string)
+
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"a2g: {message} (see '{self.prog} --help')\n")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli.argument_types import TIER, count, formats, seed
 from a2g_jax.config import check_needs, from_json, parse_flags
-from a2g_jax.generation.formats import PAGE, format_names
+from a2g_jax.generation.formats import PAGE, format_names, known_formats
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
 
@@ -28,7 +28,7 @@ def add_arguments(
     Args:
         samples: the default of ``--samples``, which ``default`` describes.
     """
-    known = format_names()
+    usual, known = format_names(), known_formats()
     parser.add_argument(
         "--control",
         action="append",
@@ -41,9 +41,11 @@ def add_arguments(
     parser.add_argument("--seed", type=seed, default=0, help="seed of the random numbers (default: 0)")
     parser.add_argument(
         "--formats",
+        "--format",
         type=formats(known),
-        default=",".join(known),
-        help=f"any of {', '.join(known)}, comma-separated (default: all)",
+        default=",".join(usual),
+        help=f"any of {', '.join(known)}, comma-separated (default: {','.join(usual)}; with --to the character's own in"
+        " place of bvh)",
     )
     parser.add_argument(
         "--transcript",

@@ -162,16 +162,18 @@ def compare(
     # This removes the talker's motion of an earlier speech, also where this one has none.
     stems = tuple(dict.fromkeys((*_stems_before(Path(out)), "sample", TALKER, *runs)))
     figures = [] if speech.truth is None else [speech.truth]
-    with MotionFiles(out, stems, formats, REPORTS) as files:
+    sound = (audio[first.mel.sample_rate], first.mel.sample_rate)
+    with MotionFiles(out, stems, formats, REPORTS, speech=sound) as files:
         for name, made in motions.items():
             for number, motion in enumerate(made):
-                names = files.write(number, motion, name)
+                files.write(number, motion, name)
                 label = f"{name} {number}" if samples > 1 else name
                 findings = checked[name].reports[number].findings
                 note = _note(runs[name], without.get(name, ()))
-                figures.append(checked_figure(motion, label, findings, note, names))
+                figures.append(checked_figure(motion, label, findings, note, files.names(number, name)))
         if speech.truth is not None:
-            figures[0] = replace(speech.truth, files=files.write(0, speech.truth.motion, TALKER))
+            files.write(0, speech.truth.motion, TALKER)
+            figures[0] = replace(speech.truth, files=files.names(0, TALKER))
         systems = {name: one.to_json() for name, one in checked.items()}
         write_json(files.folder / CHECKS, {"format": _FORMAT, "systems": systems})
         if PAGE in formats:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from a2g_jax.generation.checked import Checked
+from a2g_jax.generation.delivery import PLAIN, Delivery
 from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
 from a2g_jax.geometry.motion import Motion
@@ -30,6 +31,7 @@ def export(
     lanes: Sequence[Track] = (),
     report: Callable[[int], None] = lambda done: None,
     sample_rate: int | None = None,
+    delivery: Delivery = PLAIN,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
@@ -46,6 +48,7 @@ def export(
         lanes: further tracks of the page's timeline.
         report: called with the number of samples done: with ``strict`` once they are checked, else once written.
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
+        delivery: the character and the frame rate to write for. Motions are checked before, on the run's skeleton.
 
     Returns:
         How many files of each format were written.
@@ -57,21 +60,26 @@ def export(
     """
     audio, config = speech_at_rate(run, audio, sample_rate), run.config
     if PAGE in formats:
-        check_page_size(samples, audio_frames(run, audio), config.skeleton.joints)
+        skeleton = config.skeleton if delivery.character is None else delivery.character.rig.skeleton
+        frames = round(audio_frames(run, audio) * (delivery.fps or config.fps) / config.fps)
+        check_page_size(samples, frames, skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
     check_folder_writable(out)  # before any work
     if checked.strict:
         motions = list(_counted(motions, report))
     figures: list[Figure] = []
-    with MotionFiles(out, ("sample",), formats, REPORTS) as files:
+    speech = (audio, run.config.mel.sample_rate)
+    with MotionFiles(out, ("sample",), formats, REPORTS, speech=speech, writers=delivery.writers()) as files:
         done = 0
         try:
             for done, motion in enumerate(motions, start=1):
-                names = files.write(done - 1, motion)
+                made = delivery.make(motion)
+                files.write(done - 1, made.shown, own=made.by_format(delivery.own_format))
                 if PAGE in formats:
                     findings = checked.reports[done - 1].findings
-                    figures.append(checked_figure(motion, f"sample {done - 1}", findings, files=names))
+                    names = files.names(done - 1)
+                    figures.append(checked_figure(made.shown, f"sample {done - 1}", findings, files=names))
                 if not checked.strict:
                     report(done)
         finally:

@@ -5,7 +5,7 @@ Importable without JAX: writers are imported when they write.
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,16 +27,38 @@ class MotionFormat:
     """Suffix of its files, such as ``.bvh``."""
     writer: str
     """``module:function`` of ``write(path, motion)``, which writes a whole file or none."""
+    sound: bool = False
+    """Whether the writer takes the speech as well: ``write(path, motion, audio, sample_rate)``."""
+    check: str = ""
+    """``module:function`` that raises an ``InputError`` where files cannot be written for lack of a program."""
 
-    def write(self, path: Path, motion: "Motion") -> None:
-        """Write a motion to a file."""
-        load_object(self.writer, "writer")(path, motion)
+    def write(self, path: Path, motion: "Motion", speech: "Speech | None" = None) -> None:
+        """Write a motion to a file.
+
+        Args:
+            speech: samples and their rate, for a writer that takes them.
+        """
+        writer = load_object(self.writer, "writer")
+        if self.sound:
+            writer(path, motion, *(speech or ((), 16_000)))
+        else:
+            writer(path, motion)
+
+
+#: Mono samples in -1 to 1, and their rate in Hz.
+Speech = tuple[Any, int]
 
 
 #: The formats of this package by their names in ``--formats``.
 MOTION_FORMATS: dict[str, MotionFormat] = {
     "bvh": MotionFormat(".bvh", "a2g_jax.io.bvh:write_bvh"),
     "npz": MotionFormat(".npz", "a2g_jax.io.npz:write_motion_npz"),
+}
+#: Formats of this package that are written on request only.
+MORE_FORMATS: dict[str, MotionFormat] = {
+    "glb": MotionFormat(".glb", "a2g_jax.viz.mannequin_glb:write_mannequin_glb"),
+    "smplx": MotionFormat(".smplx.npz", "a2g_jax.generation.smplx:write_smplx_npz"),
+    "mp4": MotionFormat(".mp4", "a2g_jax.viz.player.video:write_video", True, "a2g_jax.viz.player.video:check_video"),
 }
 #: The name of the page of all motions, which :func:`a2g_jax.viz.player.write_page` writes.
 PAGE = "html"
@@ -52,10 +74,16 @@ _OTHERS = ("wav", "textgrid", "json", PAGE)
 
 
 def format_names() -> tuple[str, ...]:
-    """Names of the formats of motions, and of the page: this package's, then those of the entry-point group
-    ``a2g_jax.formats``. Nothing is imported."""
-    added = (name for name in entry_points_of(GROUP) if name not in (*MOTION_FORMATS, *_OTHERS))
+    """Names of the formats of motions, and of the page, that are written unless others are requested: this package's,
+    then those of the entry-point group ``a2g_jax.formats``. Nothing is imported."""
+    taken = (*MOTION_FORMATS, *MORE_FORMATS, *_OTHERS)
+    added = (name for name in entry_points_of(GROUP) if name not in taken)
     return (*MOTION_FORMATS, *added, PAGE)
+
+
+def known_formats() -> tuple[str, ...]:
+    """Names of all formats that can be requested: :func:`format_names` and :data:`MORE_FORMATS`."""
+    return (*format_names(), *MORE_FORMATS)
 
 
 def motion_format(name: str) -> MotionFormat | None:
@@ -64,8 +92,9 @@ def motion_format(name: str) -> MotionFormat | None:
     Raises:
         InputError: a format of another package cannot be loaded.
     """
-    if name in MOTION_FORMATS or name in _OTHERS:
-        return MOTION_FORMATS.get(name)
+    own = MOTION_FORMATS | MORE_FORMATS
+    if name in own or name in _OTHERS:
+        return own.get(name)
     point = entry_points_of(GROUP)[name]
     found = load_entry_point(point, "format")
     if not isinstance(found, MotionFormat):
@@ -118,19 +147,29 @@ class MotionFiles:
         stems: Sequence[str],
         formats: Sequence[str],
         others: str = "",
+        *,
+        speech: Speech | None = None,
+        writers: Mapping[str, Callable[[Path, Any], Any]] | None = None,
     ) -> None:
         """
         Args:
             stems: beginnings of the files' names.
             formats: names of formats; those without a file for each motion are ignored.
             others: a regular expression for further files that are replaced.
+            speech: of the motions, for formats with sound.
+            writers: by format, in place of the usual ones.
 
         Raises:
-            InputError: a format that cannot be used.
+            InputError: a format that cannot be used, or not here.
         """
         found = {name: motion_format(name) for name in formats}
         self._formats = {name: each for name, each in found.items() if each is not None}
-        suffixes = "|".join(re.escape(each.suffix) for each in (MOTION_FORMATS | self._formats).values())
+        for each in self._formats.values():
+            if each.check:
+                load_object(each.check, "check")()
+        self._speech, self._writers = speech, dict(writers or {})
+        all_formats = MOTION_FORMATS | MORE_FORMATS | self._formats
+        suffixes = "|".join(re.escape(each.suffix) for each in all_formats.values())
         begin = "|".join(map(re.escape, stems))
         own = re.compile(rf"(?:{begin})_\d\d+({suffixes})|index\.html" + (f"|{others}" if others else ""))
         self._stem = stems[0]
@@ -144,9 +183,27 @@ class MotionFiles:
     def __exit__(self, *error: Any) -> bool | None:
         return self._staged.__exit__(*error)
 
-    def write(self, number: int, motion: "Motion", stem: str = "") -> tuple[str, ...]:
-        """Write the files of a motion, and return their names."""
-        names = tuple(f"{stem or self._stem}_{number:02d}{each.suffix}" for each in self._formats.values())
-        for name, each in zip(names, self._formats.values(), strict=True):
-            each.write(self.folder / name, motion)
-        return names
+    def names(self, number: int, stem: str = "") -> tuple[str, ...]:
+        """Names of the files of a motion."""
+        return tuple(f"{stem or self._stem}_{number:02d}{each.suffix}" for each in self._formats.values())
+
+    def write(
+        self, number: int, motion: "Motion", stem: str = "", own: Mapping[str, "Motion"] | None = None
+    ) -> dict[str, Any]:
+        """Write the files of a motion.
+
+        Args:
+            own: motions of other skeletons for some formats, by name.
+
+        Returns:
+            What the given writers returned, by format.
+        """
+        returned = {}
+        for name, each in self._formats.items():
+            path = self.folder / f"{stem or self._stem}_{number:02d}{each.suffix}"
+            moved = (own or {}).get(name, motion)
+            if name in self._writers:
+                returned[name] = self._writers[name](path, moved)
+            else:
+                each.write(path, moved, self._speech)
+        return returned

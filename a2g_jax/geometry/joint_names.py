@@ -2,11 +2,12 @@
 
 Recognises the names of BEAT, ZeroEGGS, Trinity and Mixamo (``LeftForeArm``), Talking With Hands (``b_l_forearm``), SMPL
 and SMPL-X (``L_Elbow``, ``left_elbow``), Unreal (``lowerarm_l``), 3ds Max Biped (``Bip01 L Forearm``), Blender
-(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``), MikuMikuDance (``左ひじ``) and
-similar ones, with any prefix, case or separator.
+(``forearm.L``), VRM (``J_Bip_L_LowerArm``), the 47 joints of work on BEAT (``LArm1``), MikuMikuDance (``左ひじ``), Daz
+(``lShldrBend``), MakeHuman (``finger2-1.L``) and similar ones, with any prefix, case or separator.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -43,7 +44,7 @@ _SIDED: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Knee", ("lowerleg", "leglower", "calf", "shin", "knee", "lowleg", "tibia", "leg", "lowerleg01")),
     ("Hip", ("leg",)),
     ("Ankle", ("ankle", "foot")),
-    ("Foot", ("toebase", "toe", "toes", "ball", "toe0", "forefoot", "foot")),
+    ("Foot", ("toebase", "toe", "toes", "ball", "toe0", "toe11", "forefoot", "foot")),
     ("Shoulder", ("arm", "upperarm", "uparm", "humerus", "armupper", "shldr", "shoulder", "upperarm01")),
     ("Collar", ("clavicle", "collar", "collarbone", "shoulder", "shoulderblade", "shoulder01")),
     ("Elbow", ("forearm", "lowerarm", "armlower", "elbow", "lowarm", "radius", "lowerarm01", "arm1")),
@@ -51,12 +52,17 @@ _SIDED: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 _MIDDLE: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Pelvis", ("pelvis", "hips", "hip", "root")),
-    ("Neck", ("neck", "neck0", "neck00", "neck01", "neck1", "cervical")),
+    ("Neck", ("neck", "neck0", "neck00", "neck01", "neck1", "necklower", "cervical")),
     ("Head", ("head", "head0", "head01")),
 )
+#: A running number after the name, a word before it, and how many names, and which share of them, have such parts.
+_RUNNING, _FIRST = re.compile(r"_([0-9]+)$"), re.compile(r"[A-Za-z0-9]+[_: .-]")
+_FEW, _NEARLY = 6, 0.9
 #: Words after the name of a joint of the middle (``neck.x``, ``Head_M``), and of any (``forearm_stretch.l``).
 _MIDDLE_MARKS = frozenset(("m", "x", "c", "mid", "center"))
-_MARKS = frozenset(("stretch",))
+_MARKS = frozenset(("stretch", "bend"))
+#: MakeHuman numbers the fingers from the thumb, and then the bones: ``finger2-1.L``.
+_NUMBERED = re.compile(r"^finger([1-5])-([0-9])")
 _SIDED_NAMES = {name for _, names in _SIDED for name in names}
 
 
@@ -101,7 +107,9 @@ class JointName:
 
 def parse_name(name: str) -> JointName:
     """Split one joint name."""
-    words = [word.lower() for word in _WORD.findall(re.split("[:|]", in_english(name))[-1])]
+    plain = re.split("[:|]", in_english(name))[-1]
+    plain = _NUMBERED.sub(lambda found: f"{_BIPED_FINGERS[int(found[1]) - 1]}{found[2]}", plain)
+    words = [word.lower() for word in _WORD.findall(plain)]
     while len(words) > 1 and words[0] in _CASING:
         words = words[1:]
         # With "Bip01" its number.
@@ -126,19 +134,37 @@ def parse_name(name: str) -> JointName:
     return JointName("", base)
 
 
+def without_common_parts(names: Sequence[str]) -> list[str]:
+    """Names without what nearly all of them share: a word at the beginning (``Robot_LeftArm``), or a running number at
+    the end, which some exporters add (``LeftArm_07``)."""
+    plain = list(names)
+    numbers = [found[1] for name in plain if (found := _RUNNING.search(name)) is not None]
+    if len(numbers) >= max(_FEW, _NEARLY * len(plain)) and len(set(numbers)) == len(numbers):
+        plain = [_RUNNING.sub("", name) or name for name in plain]
+    words = Counter(found[0] for name in plain if (found := _FIRST.match(name)) is not None)
+    for word, count in words.most_common(1):
+        if count >= max(_FEW, _NEARLY * len(plain)):
+            plain = [name.removeprefix(word) or name for name in plain]
+    return plain
+
+
 def named_joints(names: Sequence[str]) -> dict[str, int]:
     """Indices of the joints of a body by role: ``"L_Elbow"``, ``"Pelvis"``, ``"R_Index1"`` ...
 
     Roles are those of :data:`~a2g_jax.geometry.skeleton.BODY_JOINTS` without the spines, which are identified by
     position, and ``L_`` or ``R_`` with each finger and the number of its bone. A joint has one role at most.
     """
-    parsed = [parse_name(name) for name in names]
+    parsed = [parse_name(name) for name in without_common_parts(names)]
     found: dict[str, int] = {}
     for side in "LR":
         _assign(found, f"{side}_", _SIDED, {p.base: j for j, p in _reversed(parsed) if p.side == side})
         for joint, name in _reversed(parsed):
             if name.side == side and (finger := name.finger) is not None and joint not in found.values():
                 found[f"{side}_{finger}"] = joint
+        if f"{side}_Thumb0" in found and f"{side}_Thumb1" in found and f"{side}_Thumb2" not in found:
+            # Thumbs have no intermediate bone: metacarpal, proximal and distal.
+            found[f"{side}_Thumb2"] = found.pop(f"{side}_Thumb1")
+            found[f"{side}_Thumb1"] = found.pop(f"{side}_Thumb0")
     for side, other in ("LR", "RL"):
         shoulder = found.get(f"{side}_Shoulder")
         # "LeftShoulder" is a collar if the right side has a "RightShoulder" above its "RightArm".

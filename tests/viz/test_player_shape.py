@@ -5,10 +5,14 @@ import pytest
 
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.retarget import find_rig
+from a2g_jax.geometry.retarget.upright import upright_motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.io.bvh import read_bvh
+from a2g_jax.io.character import read_character
 from a2g_jax.viz.player.roles import find_roles
 from a2g_jax.viz.player.shape import build_shape
 from a2g_jax.viz.player.stage import placement, shape_points
+from experiments.characters.rigs import unreal
 from tests.viz.figures_for_tests import body_skeleton, waving
 
 MIXAMO = {
@@ -123,3 +127,16 @@ def test_real_rigs_with_fingers(shared, path):
     place = placement(motion, shape_points(motion, shape))
     assert 1.4 < place["height"] < 2.4
     assert abs(place["heading"]) < 0.61 or place["heading"] != 0.0
+
+
+def test_a_root_on_the_floor_and_targets_of_hands_are_not_drawn(tmp_path):
+    path = unreal().write(tmp_path / "rig.bvh")
+    character = read_character(path)
+    still = read_bvh(path)
+    skeleton = upright_motion(still, character.rig).skeleton
+    shape = build_shape(skeleton)
+    root = skeleton.index("root")
+    anchors = [anchor for cone in shape.cones for anchor in (cone.start, cone.end) if len(anchor) < 4]
+    drawn = {shape.points[int(anchor[0])][0] for anchor in anchors}
+    assert skeleton.index("lowerarm_l") in drawn
+    assert not drawn & {root, *(joint for joint, name in enumerate(skeleton.names) if name.startswith("ik_"))}

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import path_up
@@ -30,6 +31,8 @@ class Match:
     """Target over source: leg length, or arm length where one of the two has no legs."""
     lift: float
     """Metres by which the target's hips are raised after scaling, so that its soles are where the source's are."""
+    still: Float[np.ndarray, "K 3 3"] | None = None
+    """Local rotations of the target's joints that nothing moves; None for those of its reference pose."""
 
     def table(self) -> str:
         """Text with a line for each target joint and one for the fingers of a hand: how they were matched."""

@@ -69,7 +69,8 @@ def _target_world(match: Match, world: Float[np.ndarray, "T J 3 3"]) -> Float[np
     source_to_target = (source.align[theirs] @ np.swapaxes(target.align[ours], -1, -2)).astype(np.float32)
     result[:, ours] = turn.astype(np.float32) @ (world[:, theirs] @ source_to_target)
     shares = {share.target: share for share in match.shares}
-    matched, align, rest = set(ours), target.align.astype(np.float32), target.rest.astype(np.float32)
+    still = target.rest if match.still is None else match.still
+    matched, align, rest = set(ours), target.align.astype(np.float32), still.astype(np.float32)
     moved: set[int] = set()
     for joint, parent in enumerate(target.skeleton.parents):
         if joint in matched:

@@ -31,7 +31,8 @@ class Mannequin:
 
     def _length(self, limb: Limb) -> float:
         offsets = np.linalg.norm(np.asarray(self.skeleton.offsets), axis=1)
-        return float(offsets[limb.middle] + offsets[limb.tip])
+        # Some rigs have joints along the bones of a limb.
+        return float(sum(offsets[joint] for joint in self._path(limb.tip, limb.top)))
 
     def _path(self, joint: int, stop: int) -> list[int]:
         """``joint`` and its ancestors below ``stop``."""

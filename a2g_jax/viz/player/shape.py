@@ -28,6 +28,12 @@ def build_shape(skeleton: Skeleton) -> Shape:
         maker.arm(side, arm)
     for leg in roles.legs.values():
         maker.leg(leg)
+    # What does not hang below the pelvis is no part of the body: a root on the floor, targets of hands and feet.
+    body = {roles.pelvis}
+    for joint, parent in enumerate(skeleton.parents):
+        if parent in body:
+            body.add(joint)
+    maker.drawn.update(set(range(skeleton.joints)) - body, {roles.pelvis})
     _generic(shape, skeleton, maker.drawn, maker.size)
     shape.wrists = tuple(roles.arms[side].tip for side in ("left", "right"))
     return shape

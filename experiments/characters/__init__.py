@@ -1,0 +1,1 @@
+"""Characters: motion for the rigs of other programs."""
