@@ -1,5 +1,6 @@
 """What every test shares: strict JAX, two devices, keys, and the real recordings where they are."""
 
+import gc
 import os
 from importlib.metadata import version
 from pathlib import Path
@@ -22,6 +23,20 @@ from jaxtyping import install_import_hook
 
 jax.config.update("jax_numpy_rank_promotion", "raise")
 _HOOK = install_import_hook("a2g_jax", "beartype.beartype")
+
+
+#: Memory of a worker, bytes, from which compiled programs are dropped: with all of the suite it would pass 5 GB.
+_MOST_MEMORY = 2.5e9
+
+
+@pytest.fixture(autouse=True, scope="module")
+def bounded_memory():
+    """Drops compiled programs between modules where they take much memory; the cache on disk still has them."""
+    yield
+    statm = Path("/proc/self/statm")
+    if statm.exists() and int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") > _MOST_MEMORY:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture
