@@ -136,6 +136,7 @@ def test_the_parts_matter(tmp_path, corpus, config, whole):
         train(config(steps=30, part_steps=7), corpus, path, resume=True, progress=False)
 
 
+@pytest.mark.slow  # a recording of its own for each length of part is compiled
 def test_an_ordinary_corpus_does_not_care_for_part_steps(tmp_path, toy_corpus, toy_run_config):
     first = train(toy_run_config(steps=6, part_steps=2), toy_corpus, tmp_path / "run", resume=False, progress=False)
     again = train(toy_run_config(steps=6), toy_corpus, tmp_path / "again", resume=False, progress=False)
