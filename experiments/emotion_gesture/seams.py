@@ -32,6 +32,7 @@ from jaxtyping import Float, Int
 
 from a2g_jax.cli import main as command_line
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_layout import MANIFEST
 from a2g_jax.errors import InputError
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import atomic_path, write_json
@@ -40,6 +41,7 @@ from a2g_jax.metrics.physical import jerk
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.training.run import Run, open_run
+from a2g_jax.training.run_file import WEIGHTS_FILE
 from experiments.motion.speeches import shared_folder
 
 RESULTS = Path(__file__).parent / "results"
@@ -86,7 +88,7 @@ def main() -> None:
 
 def prepared(out: Path, source: Path, *flags: str) -> Corpus:
     """The take as a corpus of a neutral recording."""
-    if not (out / "corpus.json").is_file():
+    if not (out / MANIFEST).is_file():
         _run("prepare", "beat", source, "--labelled", "--random-split", "--workers", 1, *flags, "--out", out)
     return Corpus.open(out)
 
@@ -94,7 +96,8 @@ def prepared(out: Path, source: Path, *flags: str) -> Corpus:
 def trained(out: Path, corpus: Corpus) -> Path:
     """A run of the preset, trained on the take for a short time."""
     steps = [part for name, value in STEPS.items() for part in (f"--{name}", value)]
-    _run("train", "emotion_gesture", "--corpus", corpus.path, "--out", out, "--resume", "--seed", SEED, *steps)
+    if not (out / WEIGHTS_FILE).is_file():
+        _run("train", "emotion_gesture", "--corpus", corpus.path, "--out", out, "--resume", "--seed", SEED, *steps)
     return out
 
 
@@ -209,7 +212,7 @@ def picture(path: Path, rows: list[dict[str, Any]]) -> None:
     figure, panels = plt.subplots(1, len(names), figsize=(5.2 * len(names), 3.6), layout="constrained", squeeze=False)
     for axes, name in zip(panels[0], names, strict=True):
         own = [row for row in rows if row["run"] == name and not row["seed_poses"]]
-        for row, colour in zip(own, _COLOURS, strict=True):
+        for row, colour in zip(own, _COLOURS, strict=False):
             time = (np.arange(len(row["around"])) - len(row["around"]) // 2) / row["fps"]
             axes.plot(time, row["around"], color=colour, label=_kind(row["setting"]))
         for (ruler, limit), style in zip(own[-1]["limits"].items(), ("--", ":"), strict=False):

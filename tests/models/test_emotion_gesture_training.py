@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +15,8 @@ import pytest
 
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
+from a2g_jax.data.settings import Features
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.words import word_id
@@ -168,11 +169,11 @@ def test_models_without_seed_poses_refuse_a_seed_clip(speech, tmp_path, capsys):
     assert "--seed-clip: runs of audio2gestures take no seed poses." in capsys.readouterr().err
 
 
-def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tmp_path, capsys):
-    folder = tmp_path / "corpus"
-    shutil.copytree(toy_corpus.path, folder)
-    for path in (folder / "annotations").iterdir():
-        path.write_text(json.dumps({**json.loads(path.read_text()), "words": []}))
+def test_a_corpus_without_words_trains_without_the_beat_alignment(tmp_path, capsys):
+    folder, features = tmp_path / "corpus", Features()
+    takes = (replace(talk(8.0, seed, name=f"take{seed}"), words=()) for seed in range(6))
+    rows = (prepare_recording(take, features) for take in takes)
+    write_corpus(folder, rows, features=features, recipe={"reader": "talker"})
     assert main(train(folder, tmp_path / "run")) == 2
     assert "none of its recordings has words" in capsys.readouterr().err
     assert main(train(folder, tmp_path / "run", beat_weight=0, steps=2, vae_steps=0)) == 0
