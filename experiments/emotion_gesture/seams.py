@@ -5,7 +5,7 @@
 The take of 64 s (words, neutral) is prepared with ``--features emotion-gesture --labelled --random-split``, and the
 preset ``tiny`` is trained on it for a few hundred steps (:data:`STEPS`; seed 0): enough to run every stage, not enough
 for good motion. That run and the named one, for which the take is prepared with ``--for``, generate motion for the
-take's whole audio: four samples (seed 0), without seed poses and with the take's first poses.
+take's whole audio: four samples (seed 0), without seed poses and with the take's first poses. Equal samples count once.
 
 Jerk is the norm of the third difference of a wrist's position relative to the pelvis, times fps cubed. Every figure is
 of *stretches*: the maximum over four jerks in succession, and both wrists. The stretch of the seam between frames
@@ -37,7 +37,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.generation.generator import Generator
 from a2g_jax.io.files import atomic_path, write_json
 from a2g_jax.metrics.liveliness import body_of
-from a2g_jax.metrics.physical import jerk
+from a2g_jax.metrics.physical import jerk, speeds
 from a2g_jax.talker.recordings import talk
 from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.training.run import Run, open_run
@@ -121,10 +121,11 @@ def measured(name: str, run: Run, corpus: Corpus) -> Iterator[dict[str, Any]]:
         generator = Generator(replace(run, config=run.config.with_sampling(**setting)))
         for seeds in (None, pose[: model.seed_frames]):
             motions = generator.rows(audio, SAMPLES, SEED, seed_poses=seeds)
-            found = [stretches(wrists(np.asarray(rows, np.float32)), fps) for rows in motions]
+            found = distinct([wrists(np.asarray(rows, np.float32)) for rows in motions])
             about = {"run": name, "setting": setting, "seed_poses": seeds is not None, "fps": fps}
-            yield about | figures(found, stride, limits)
-    yield {"run": name, "setting": None, "seed_poses": None, "fps": fps} | figures([take], stride, limits)
+            yield about | figures(found, fps, stride, limits)
+    about = {"run": name, "setting": None, "seed_poses": None, "fps": fps}
+    yield about | figures([wrists(pose)], fps, stride, limits)
 
 
 def generated_talk(fps: float) -> Float[np.ndarray, " n"]:
@@ -134,6 +135,15 @@ def generated_talk(fps: float) -> Float[np.ndarray, " n"]:
         for minute in range(MINUTES)
     )
     return np.concatenate([stretches(body_of(motion).wrists, fps) for motion in motions])
+
+
+def distinct(motions: list[Wrists]) -> list[Wrists]:
+    """The motions without repetitions: without drawn emotions, samples differ by their first poses alone."""
+    found: list[Wrists] = []
+    for motion in motions:
+        if not any(np.allclose(motion, other, atol=1e-4) for other in found):
+            found.append(motion)
+    return found
 
 
 def stretches(wrists: Wrists, fps: float) -> Float[np.ndarray, " n"]:
@@ -157,19 +167,28 @@ def places(count: int, stride: int) -> tuple[Int[np.ndarray, " s"], Int[np.ndarr
     return seams, rows[~crosses]
 
 
-def figures(motions: list[Float[np.ndarray, " n"]], stride: int, limits: dict[str, float]) -> dict[str, Any]:
-    """Medians at seams and away from them, m/s3, and shares above the percentile of each recorded motion."""
-    at, away = (np.concatenate([one[places(len(one), stride)[part]] for one in motions]) for part in (0, 1))
+def figures(motions: list[Wrists], fps: float, stride: int, limits: dict[str, float]) -> dict[str, Any]:
+    """Medians at seams and away from them, and shares above the percentile of each recorded motion.
+
+    ``speed`` is that of the faster wrist in the step over a seam, m/s, beside all other steps.
+    """
+    found = [stretches(one, fps) for one in motions]
+    at, away = (np.concatenate([one[places(len(one), stride)[part]] for one in found]) for part in (0, 1))
+    steps = np.stack([np.asarray(speeds(one, fps)).max(axis=1) for one in motions])
+    over = np.arange(1, steps.shape[1] + 1) % stride == 0
     above = lambda limit: {  # noqa: E731
         "value": limit,
         "seams_above": float(np.mean(at > limit)),
         "away_above": float(np.mean(away > limit)),
     }
     return {
+        "motions": len(motions),
         "seams": len(at),
         "median": float(np.median(at)),
         "median_away": float(np.median(away)),
-        "around": around(motions, stride),
+        "speed": float(np.median(steps[:, over])),
+        "speed_away": float(np.median(steps[:, ~over])),
+        "around": around(found, stride),
         "limits": {name: above(limit) for name, limit in limits.items()},
     }
 
@@ -189,18 +208,20 @@ def page(found: dict[str, Any]) -> str:
         "# Seams between chunks on a real take",
         "",
         f"Made by `python -m experiments.emotion_gesture.seams`. The take's run is `{steps} --seed {found['seed']}`;"
-        f" {found['samples']} samples. Wrist jerk, m/s3, maximum over {STRETCH} frames; p95 is that of recorded motion,"
-        " and the last two columns are shares above it.",
+        f" {found['samples']} samples, equal ones once. Wrist jerk, m/s3, maximum over {STRETCH} frames;"
+        " p95 is that of recorded motion, and the last two columns are shares above it.",
         "",
-        "| run | generation | seed poses | seams | median at seams | away | recorded motion | p95 | at seams | away |",
-        f"|{' --- |' * 10}",
+        "| run | generation | seed poses | seams | speed at seams, m/s | away | jerk at seams | away | recorded motion"
+        " | p95 | above it at seams | away |",
+        f"|{' --- |' * 12}",
     ]
     for row in found["rows"]:
         kind = _kind(row["setting"])
         seeds = "" if row["seed_poses"] is None else "the take's" if row["seed_poses"] else "none"
         for name, limit in row["limits"].items():
             lines.append(
-                f"| {row['run']} | {kind} | {seeds} | {row['seams']} | {row['median']:.0f} | {row['median_away']:.0f}"
+                f"| {row['run']} | {kind} | {seeds} | {row['seams']} | {row['speed']:.2f}"
+                f" | {row['speed_away']:.2f} | {row['median']:.0f} | {row['median_away']:.0f}"
                 f" | {name} | {limit['value']:.0f} | {limit['seams_above']:.0%} | {limit['away_above']:.0%} |"
             )
     return "\n".join([*lines, "", "![Jerk by the time from the nearest seam](seams.png)", ""])

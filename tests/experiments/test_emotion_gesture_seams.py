@@ -5,7 +5,7 @@ import pytest
 
 from a2g_jax.errors import InputError
 from experiments.emotion_gesture import seams
-from experiments.emotion_gesture.seams import around, figures, picture, places, stretches
+from experiments.emotion_gesture.seams import around, distinct, figures, picture, places, stretches
 
 STRIDE, FRAMES = 20, 107
 
@@ -41,8 +41,9 @@ def test_stretches_are_maxima_of_four_third_differences():
 
 
 def test_figures_and_their_picture(tmp_path):
-    motions = [stretches(walk(0.1, at), 15.0) for at in range(STRIDE, FRAMES, STRIDE)]
-    found = figures(motions, STRIDE, {"the take": 50.0})
+    motions = [walk(0.1, at) for at in range(STRIDE, FRAMES, STRIDE)]
+    found = figures(distinct([*motions, motions[0]]), 15.0, STRIDE, {"the take": 50.0})
+    assert found["motions"] == 5
     assert found["seams"] == 25
     assert found["limits"]["the take"] == {"value": 50.0, "seams_above": 0.2, "away_above": 0.0}
     # Each step is in one of five chunks, so that medians do not show it; in every chunk they do, around 0.
