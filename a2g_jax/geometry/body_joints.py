@@ -26,6 +26,16 @@ def find_body_joints(skeleton: Skeleton) -> tuple[int, ...] | None:
     return found if _is_body_tree(skeleton, found) else None
 
 
+def find_wrists(skeleton: Skeleton) -> tuple[int, int] | None:
+    """Indices of the left and the right wrist, also in rigs that lack other joints of the body, such as upper bodies.
+
+    None where a wrist is missing.
+    """
+    joints = named_joints(skeleton.names)
+    left, right = joints.get("L_Wrist"), joints.get("R_Wrist")
+    return None if left is None or right is None else (left, right)
+
+
 def path_up(parents: tuple[int, ...], joint: int, above: int) -> list[int] | None:
     """The joints strictly between ``joint`` and its ancestor ``above``, from below; None if it is no ancestor."""
     path = []

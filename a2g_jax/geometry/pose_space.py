@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.body_joints import find_body_joints
+from a2g_jax.geometry.body_joints import find_wrists
 from a2g_jax.geometry.euler import continuous_yxz
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
@@ -27,7 +27,7 @@ from a2g_jax.geometry.rotation import (
     matrix_to_6d,
     yxz_from_matrix,
 )
-from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.geometry.skeleton import Skeleton
 
 #: Names of the rows of a pose, for messages.
 _NOUNS = {
@@ -200,9 +200,8 @@ class PoseSpace:
         return places
 
     def wrist_rows(self) -> tuple[int, ...] | None:
-        """Joints of the left and right wrist; None where they are not found."""
-        body = find_body_joints(self.body) if isinstance(self.body, Skeleton) else None
-        return None if body is None else tuple(body[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR")
+        """Joints of the left and right wrist, also of upper bodies without legs; None where they are not found."""
+        return find_wrists(self.body) if isinstance(self.body, Skeleton) else None
 
     def wrists(self, positions: Float[np.ndarray, "T P _"]) -> Float[np.ndarray, "T w _"]:
         """Positions of both wrists, or of every point where wrists are not found."""

@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from a2g_jax.geometry.body_joints import find_body_joints
+from a2g_jax.geometry.body_joints import find_wrists
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
+from a2g_jax.geometry.skeleton import Skeleton
 
 
 def local_places(motion: Motion) -> Float[np.ndarray, "T J 3"]:
@@ -17,10 +17,8 @@ def local_places(motion: Motion) -> Float[np.ndarray, "T J 3"]:
 
 def hand_joints(skeleton: Skeleton) -> list[int]:
     """Both wrists; all joints where no wrists are found."""
-    joints = find_body_joints(skeleton)
-    if joints is None:
-        return list(range(skeleton.joints))
-    return [joints[BODY_JOINTS.index(f"{side}_Wrist")] for side in "LR"]
+    wrists = find_wrists(skeleton)
+    return list(range(skeleton.joints)) if wrists is None else list(wrists)
 
 
 def hand_speeds(places: Float[np.ndarray, "T J 3"], skeleton: Skeleton, fps: float) -> Float[np.ndarray, " t"]:

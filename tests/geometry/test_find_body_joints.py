@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from a2g_jax.geometry.body_joints import find_body_joints
+from a2g_jax.geometry.body_joints import find_body_joints, find_wrists
 from a2g_jax.geometry.skeleton import BODY_JOINTS, BODY_PARENTS, Skeleton
 from a2g_jax.io.bvh import read_bvh
 
@@ -141,3 +141,18 @@ def test_real_rigs(shared, name):
     place = dict(zip(BODY_JOINTS, rest, strict=True))
     assert place["Head"][1] > place["Spine1"][1] > place["L_Knee"][1] > place["L_Foot"][1]
     assert place["L_Shoulder"][0] > place["R_Shoulder"][0]
+
+
+def test_wrists_of_upper_bodies_are_found_without_legs():
+    whole = humanoid()
+    body = find_body_joints(whole)
+    assert find_wrists(whole) == (body[BODY_JOINTS.index("L_Wrist")], body[BODY_JOINTS.index("R_Wrist")])
+    legs = {side + part for side in ("Left", "Right") for part in SIDE[0]}
+    parents = {
+        name: whole.names[parent] if parent >= 0 else None
+        for name, parent in zip(whole.names, whole.parents, strict=True)
+    }
+    upper = rig([(name, parent) for name, parent in parents.items() if name not in legs])
+    assert find_body_joints(upper) is None
+    assert [upper.names[joint] for joint in find_wrists(upper)] == ["LeftHand", "RightHand"]
+    assert find_wrists(rig([("Hips", None), ("LeftArm", "Hips"), ("LeftHand", "LeftArm")])) is None

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -10,11 +9,14 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import jax
 import numpy as np
 import pytest
 
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
+from a2g_jax.data.settings import Features
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.io.words import word_id
@@ -51,6 +53,7 @@ SETTINGS = {
     "checkpoint-every": 2,
     "validate-every": 5,
     "log-every": 1,
+    "keep-checkpoints": 99,
 }
 
 
@@ -86,10 +89,15 @@ def leaves(tree, path=()):
         yield from leaves(value, (*path, name)) if isinstance(value, dict) else [("/".join((*path, name)), value)]
 
 
-def test_the_second_stage_leaves_everything_but_the_vae(run):
+def stored(run, step):
+    """The state of training in a checkpoint."""
     from orbax.checkpoint import v1 as ocp
 
-    states = [dict(leaves(ocp.load(run.absolute() / "checkpoints" / step)["params"])) for step in ("8", "10", "12")]
+    return ocp.load(run.absolute() / "checkpoints" / str(step))
+
+
+def test_the_stage_of_the_vae_leaves_everything_but_the_vae(run):
+    states = [dict(leaves(stored(run, step)["params"])) for step in (8, 12, 14)]
     before, after, last = states
     assert {name.split("/")[0] for name in after if not np.array_equal(after[name], before[name])} == {"vae"}
     found = dict(leaves(load_run(run).params))
@@ -97,10 +105,10 @@ def test_the_second_stage_leaves_everything_but_the_vae(run):
         np.testing.assert_array_equal(value, last[name.replace("generator/", "average/")])
     assert not any(name.startswith("average/") for name in found)
     lines = [json.loads(line) for line in (run / "metrics.jsonl").read_text().splitlines()]
-    main_lines = [line for line in lines if line["split"] == "train" and line["step"] <= 6]
+    main_lines = [line for line in lines if line["split"] == "train" and 2 < line["step"] <= 8]
     terms = {"reconstruction", "smooth", "adversarial", "discriminator", "emotion", "beat", "emotion_accuracy"}
     assert all(terms <= set(line) for line in main_lines)
-    assert [line["step"] for line in lines if "vae_error" in line and line["split"] == "train"] == [7, 8, 9, 10]
+    assert [line["step"] for line in lines if "vae_error" in line and line["split"] == "train"] == [9, 10, 11, 12]
     assert np.isfinite([value for line in lines for value in line.values() if isinstance(value, float)]).all()
 
 
@@ -161,11 +169,11 @@ def test_models_without_seed_poses_refuse_a_seed_clip(speech, tmp_path, capsys):
     assert "--seed-clip: runs of audio2gestures take no seed poses." in capsys.readouterr().err
 
 
-def test_a_corpus_without_words_trains_without_the_beat_alignment(toy_corpus, tmp_path, capsys):
-    folder = tmp_path / "corpus"
-    shutil.copytree(toy_corpus.path, folder)
-    for path in (folder / "annotations").iterdir():
-        path.write_text(json.dumps({**json.loads(path.read_text()), "words": []}))
+def test_a_corpus_without_words_trains_without_the_beat_alignment(tmp_path, capsys):
+    folder, features = tmp_path / "corpus", Features()
+    takes = (replace(talk(8.0, seed, name=f"take{seed}"), words=()) for seed in range(6))
+    rows = (prepare_recording(take, features) for take in takes)
+    write_corpus(folder, rows, features=features, recipe={"reader": "talker"})
     assert main(train(folder, tmp_path / "run")) == 2
     assert "none of its recordings has words" in capsys.readouterr().err
     assert main(train(folder, tmp_path / "run", beat_weight=0, steps=2, vae_steps=0)) == 0
@@ -189,7 +197,9 @@ def test_pretrained_word_vectors_are_where_training_begins(toy_corpus, tmp_path,
 
 def test_resuming_after_sigkill_in_each_stage_equals_not_having_stopped(toy_corpus, tmp_path):
     names = ("mining_steps", "steps", "vae_steps", "sampled_steps")
-    settings = {**dict.fromkeys(names, 20), "checkpoint_every": 2, "keep_checkpoints": 99}
+    settings = {**dict.fromkeys(names, 20), "checkpoint_every": 2}
+    # An average that moves within the stage, and initial poses of generated chunks.
+    settings |= {"average_decay": 0.9, "continued_chunks": 2}
     folder, whole = tmp_path / "killed", tmp_path / "whole"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     for wanted in (6, 26, 46, 66):
@@ -205,10 +215,18 @@ def test_resuming_after_sigkill_in_each_stage_equals_not_having_stopped(toy_corp
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
         assert process.wait() == -signal.SIGKILL, "it was killed before it had finished"
+    last = stored(folder, 66)["params"]
+    generator, average = dict(leaves(last["generator"])), dict(leaves(last["average"]))
+    assert any(not np.array_equal(generator[name], average[name]) for name in generator), "it was averaging"
     assert main(train(toy_corpus.path, folder, "--resume", **settings)) == 0
     assert main(train(toy_corpus.path, whole, **settings)) == 0
     ours, theirs = dict(leaves(load_run(folder).params)), dict(leaves(load_run(whole).params))
     assert all(np.array_equal(ours[name], theirs[name]) for name in theirs)
+    # Also the discriminator, the last weights beside their average, and the states of the optimisers.
+    for name in ("params", "optimisers"):
+        ours, theirs = (jax.tree.leaves(stored(path, 80)[name]) for path in (folder, whole))
+        assert len(ours) == len(theirs)
+        assert all(np.array_equal(one, other) for one, other in zip(ours, theirs, strict=True))
 
 
 def test_it_is_evaluated(run, toy_corpus, tmp_path):
