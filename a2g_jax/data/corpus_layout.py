@@ -11,7 +11,7 @@ MANIFEST = "manifest.json"
 PARTS = "parts.json"
 #: The arrays of a corpus, all recordings one after the other: log-mel (N, width), poses (N, R, D), root (N, 3).
 ARRAYS = ("audio.npy", "pose.npy", "root.npy")
-#: Folder of a JSON file for each recording: its words, and what else is known of it.
+#: Folder of a JSON file for each recording: its words and other annotations.
 ANNOTATIONS = "annotations"
 #: The audio itself, where it is stored: 16-bit samples, as many for each recording as its frames last.
 WAVEFORM = "waveform.npy"

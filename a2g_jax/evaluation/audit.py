@@ -4,18 +4,19 @@ The seed is the same for all, so that differences are due to the audio; their sc
 different seeds.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 from scipy import ndimage
 
-from a2g_jax.metrics.intervals import mean_interval, t_quantile
+from a2g_jax.metrics.intervals import difference_interval, mean_interval
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speed_peaks
 
 LogMel = Float[np.ndarray, "_ bands"]
 Points = Float[np.ndarray, "_ J 3"]
+Owners = Shaped[np.ndarray, " n"]
 
 #: Circular shifts of the audio, seconds.
 SHIFTS = (1.0, 2.0, 5.0)
@@ -70,7 +71,12 @@ def conditions(clips: list[LogMel], number: int, fps: float, speakers: list[str]
 
 
 def listening_audit(
-    generate: Generate, clips: list[LogMel], speakers: list[str], fps: float, samples: int = 4
+    generate: Generate,
+    clips: list[LogMel],
+    speakers: list[str],
+    fps: float,
+    samples: int = 4,
+    recordings: Sequence[int] | None = None,
 ) -> dict[str, Any]:
     """Changes of motion and agreement with the audio under every condition, with verdicts; JSON-able.
 
@@ -79,12 +85,14 @@ def listening_audit(
         clips: log-mel rows of each clip, in dB.
         speakers: the speaker of each clip.
         samples: number of seeds.
+        recordings: the recording of each clip, since clips of one depend on each other; None if each is one of its own.
 
     Returns:
         ``conditions``: for each, the mean change of the motion in cm and as a share of the change by another seed, and
-        the agreement of its wrist-speed peaks with the true audio's energy peaks, with its 95 % interval over clips;
-        ``sampling_cm``, the mean distance of motions of two seeds; ``verdicts``.
+        the agreement of its wrist-speed peaks with the true audio's energy peaks, with its 95 % interval over
+        recordings (None for too few); ``sampling_cm``, the mean distance of motions of two seeds; ``verdicts``.
     """
+    owners = np.arange(len(clips)) if recordings is None else np.asarray(recordings)
     changes: dict[str, list[float]] = {}
     rhythm: dict[str, list[float]] = {}
     sampling = []
@@ -106,20 +114,23 @@ def listening_audit(
             "change_cm": float(np.mean(changes[name])),
             "change_of_sampling": float(np.mean(changes[name])) / max(noise, 1e-9),
             "agreement": float(np.mean(rhythm[name])),
-            "agreement_interval": _interval(rhythm[name]),
+            "agreement_interval": _interval(rhythm[name], owners),
         }
         for name in changes
     }
-    return {"sampling_cm": noise, "clips": len(clips), "conditions": table, "verdicts": _verdicts(table, rhythm, noise)}
+    about = {"sampling_cm": noise, "clips": len(clips), "recordings": len(np.unique(owners))}
+    return {**about, "conditions": table, "verdicts": _verdicts(table, rhythm, noise, owners)}
 
 
-def _interval(values: list[float]) -> list[float] | None:
-    """95 % interval over clips; None for too few."""
-    interval = mean_interval(np.array(values))
+def _interval(values: list[float], owners: Owners) -> list[float] | None:
+    """95 % interval over recordings; None for too few."""
+    interval = mean_interval(np.array(values), owners)
     return None if np.isnan(interval.low) else [interval.low, interval.high]
 
 
-def _verdicts(table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], noise: float) -> list[str]:
+def _verdicts(
+    table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], noise: float, owners: Owners
+) -> list[str]:
     """Verdicts, worst first; ``"listens"`` without any other."""
     changed = {name: row["change_cm"] for name, row in table.items() if name != "true audio"}
     if max(changed.values()) < DEAF * noise:
@@ -127,22 +138,21 @@ def _verdicts(table: dict[str, dict[str, Any]], rhythm: dict[str, list[float]], 
     late = [f"{seconds:g} s late" for seconds in SHIFTS]
     shifted = np.mean([rhythm[name] for name in late], axis=0)
     verdicts = []
-    if not _significantly_more(np.array(rhythm["true audio"]), shifted):
+    if not _significantly_more(np.array(rhythm["true audio"]), shifted, owners):
         verdicts.append("its motion agrees no more with its own audio than motion made for delayed audio")
     silence, level = table["silence"]["change_cm"], table["loudness alone"]["change_cm"]
     even = np.array(rhythm["even loudness"])
-    if silence > DEAF * noise and level < (1.0 - LOUDNESS) * silence and not _significantly_more(even, shifted):
+    if silence > DEAF * noise and level < (1.0 - LOUDNESS) * silence and not _significantly_more(even, shifted, owners):
         verdicts.append("follows loudness alone: the level without the speech gives nearly the same motion")
     return verdicts or ["listens"]
 
 
-def _significantly_more(values: Float[np.ndarray, " n"], others: Float[np.ndarray, " n"]) -> bool:
-    """Whether the 95 % interval of the paired difference is above zero; for a single clip, whether it is large."""
-    difference = values - others
-    if len(difference) < 2:
-        return bool(difference.mean() > 0.05)
-    error = difference.std(ddof=1) / np.sqrt(len(difference))
-    return bool(difference.mean() > max(t_quantile(len(difference)) * error, 1e-3))
+def _significantly_more(values: Float[np.ndarray, " n"], others: Float[np.ndarray, " n"], owners: Owners) -> bool:
+    """Whether the 95 % interval of the paired difference is above zero; for a single recording, whether it is large."""
+    difference = difference_interval(values, others, owners, least=2)
+    if difference.clips < 2:
+        return bool(difference.mean > 0.05)
+    return bool(difference.low > 0.0 and difference.mean > 1e-3)
 
 
 def _distance(first: Points, second: Points) -> float:

@@ -34,7 +34,7 @@ from a2g_jax.training.run import Run
 #: Longest stretch that is scored, frames (Audio2Gestures, Sec. 5.3.1).
 MOST_FRAMES = 5000
 #: Shortest stretch that is scored: two clips of 50 frames, for diversity. Fewer than three stretches are cut into
-#: pieces of that length, for intervals over clips.
+#: pieces of that length, for more clips than recordings.
 _LEAST_FRAMES, _FEW = 100, 3
 #: Clips of an audit, and their length in seconds.
 _AUDIT_CLIPS, _AUDIT_SECONDS = 8, 30.0
@@ -219,7 +219,8 @@ def _audit(run: Run, corpus: Corpus, scorer: Scorer, segments: list[Segment], se
         rows = next(generator.rows(np.asarray(audio.features, np.float32), 1, (seed + number) % 2**31, **given))
         return scorer.space.wrists(scorer.space.positions(rows))
 
-    return listening_audit(generate, clips, speakers, corpus.fps)
+    recordings = [segment.recording for segment in chosen]
+    return listening_audit(generate, clips, speakers, corpus.fps, recordings=recordings)
 
 
 def _pieces(segment: Segment, frames: int) -> list[Segment]:

@@ -10,7 +10,7 @@ from a2g_jax.evaluation.compare import check_comparable as check_comparable
 from a2g_jax.evaluation.compare import merge as merge
 from a2g_jax.evaluation.compare import read_report as read_report
 from a2g_jax.evaluation.emotion_tables import emotion_lines, emotions_picture
-from a2g_jax.evaluation.report_cells import columns, heading, markdown_cell, run_rows
+from a2g_jax.evaluation.report_cells import columns, counted, heading, markdown_cell, run_rows
 from a2g_jax.evaluation.report_cells import vectors_text as vectors_text
 from a2g_jax.evaluation.report_latex import latex
 from a2g_jax.evaluation.report_notes import notes, preface
@@ -100,22 +100,28 @@ def _plain(name: str) -> str:
     return " ".join(name.split()).replace("|", "\\|")
 
 
+def _clips(audit: dict[str, Any]) -> str:
+    """Number of clips, and of recordings; audits of 0.1 do not have the latter."""
+    clips, recordings = audit["clips"], audit.get("recordings")
+    return f"{clips} clips" if recordings in (None, clips) else f"{clips} clips of {counted(recordings, 'recording')}"
+
+
 def _audit_lines(name: str, audit: dict[str, Any]) -> list[str]:
     """The section of a run's audit."""
     lines = [
-        f"## Does {name} listen?",
+        f"## Does {_plain(name)} listen?",
         "",
-        f"{'; '.join(audit['verdicts'])}. ({audit['clips']} clips; another seed changes the wrists' motion by"
+        f"{'; '.join(audit['verdicts'])}. ({_clips(audit)}; another seed changes the wrists' motion by"
         f" {audit['sampling_cm']:.1f} cm.)",
         "",
         "| audio | change of the motion, cm | as a share of another seed's | agreement with the true audio |",
         "| --- | --- | --- | --- |",
     ]
-    for name, row in audit["conditions"].items():
+    for audio, row in audit["conditions"].items():
         share, agreement = f"{row['change_of_sampling']:.2f}", f"{row['agreement']:.3f}"
         if row.get("agreement_interval"):
             agreement += f" [{row['agreement_interval'][0]:.3f}, {row['agreement_interval'][1]:.3f}]"
         elif "agreement_interval" in row:
             agreement += " [-]"
-        lines.append(f"| {name} | {row['change_cm']:.1f} | {share} | {agreement} |")
+        lines.append(f"| {audio} | {row['change_cm']:.1f} | {share} | {agreement} |")
     return [*lines, ""]

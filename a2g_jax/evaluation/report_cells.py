@@ -107,6 +107,11 @@ def vectors_text(cell: Cell, digits: int = 2) -> str:
     return f" ({text})"
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: ``1 recording``, ``2 recordings``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def reasons(result: dict[str, Any]) -> list[str]:
     """Why scores or intervals are missing, each reason once."""
     found: dict[str, None] = {}

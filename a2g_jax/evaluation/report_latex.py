@@ -10,6 +10,7 @@ from a2g_jax.evaluation.report_cells import (
     ARROWS,
     best_runs,
     columns,
+    counted,
     describe,
     has_interval,
     has_value,
@@ -200,7 +201,7 @@ def _origin(result: dict[str, Any]) -> list[str]:
 
 def _caption(result: dict[str, Any]) -> str:
     about, rows = result["about"], result["rows"]
-    over = f"{about['recordings']} recordings" if "recordings" in about else "clips"
+    over = counted(about["recordings"], "recording") if "recordings" in about else "clips"
     seeds = any("seeds" in row for row in rows)
     parts = [
         f"Scores on the {about['split']} split: {about['clips']} clips, {about['seconds']:.0f} s.",

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from a2g_jax.evaluation.report_cells import condition, reasons
-from a2g_jax.metrics.intervals import LEAST
+from a2g_jax.evaluation.report_cells import condition, counted, reasons
 from a2g_jax.metrics.units import find_units
 
 
@@ -67,21 +66,20 @@ def _intervals(result: dict[str, Any]) -> list[str]:
     if "recordings" not in about:  # of before 0.2
         few = " With few clips intervals are wide and understate the uncertainty." if about["clips"] < 10 else ""
         return ["Brackets hold 95 % intervals over clips (percentile bootstrap)." + few]
+    over = counted(about["recordings"], "recording")
     lines = [
-        f"Brackets hold 95 % intervals over {about['recordings']} recordings by Student's t (emotion accuracy:"
+        f"Brackets hold 95 % intervals over {over} by Student's t (emotion accuracy:"
         " Wilson's; FGD, CHI, silhouette: jackknife). They are about these speakers. Coverage by simulation: 0.95 for"
         " normal scores; for log-normal ones, very skewed, 0.82 with 5 recordings, 0.83 with 10, 0.91 with 50."
     ]
     if about["clips"] > about["recordings"]:
-        lines[0] += f" The {about['clips']} clips of a recording count together: they are not independent."
+        lines[0] += " Clips of one recording count together: they are not independent."
     if any("seeds" in row for row in result["rows"]):
         lines.append(
             "Rows of several seeds are means over runs that differ in nothing else, with intervals over seeds by"
             " Student's t; they hold the spread of training, not that of recordings."
         )
     lines += [f"A dash: {reason}." for reason in reasons(result)]
-    if about["recordings"] < LEAST and about["clips"] > about["recordings"]:
-        lines.append(f"The clips are pieces of {about['recordings']} recording(s), which are not independent.")
     return lines
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from a2g_jax.evaluation.report_cells import columns, has_interval, has_value, heading, lacks_interval, reasons
+from a2g_jax.evaluation.report_cells import columns, counted, has_interval, has_value, heading, lacks_interval, reasons
 from a2g_jax.evaluation.row_names import BASELINES, HALVES
 from a2g_jax.evaluation.scores import Metric
 from a2g_jax.io.files import atomic_path
@@ -128,7 +128,7 @@ def _short(name: str, most: int = 40) -> str:
 
 def _legend(result: dict[str, Any]) -> list[str]:
     about = result["about"]
-    over = f"{about['recordings']} recordings" if "recordings" in about else "clips"
+    over = counted(about["recordings"], "recording") if "recordings" in about else "clips"
     if any("seeds" in row for row in result["rows"]):
         over += ", of rows of several seeds over seeds"
     lines = [f"Black lines: 95 % intervals over {over}. Hatched bars are cut at the arrow; the number is their value."]

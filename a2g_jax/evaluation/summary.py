@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from a2g_jax.evaluation.report_cells import counted
 from a2g_jax.evaluation.scores import Metric, Scorer
 from a2g_jax.metrics.intervals import LEAST, mean_interval, share_interval
 
@@ -73,4 +74,4 @@ def interval_cell(metric: Metric, values: Values, recordings: Int[np.ndarray, " 
 
 def too_few_recordings(count: int) -> str:
     """Why there is no interval."""
-    return f"{count} recording{'' if count == 1 else 's'}: an interval needs {LEAST} or more"
+    return f"{counted(count, 'recording')}: an interval needs {LEAST} or more"

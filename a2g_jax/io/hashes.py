@@ -102,11 +102,11 @@ def _folder_state(path: Path) -> list[Any]:
     return [count, modified, changed, digest.hexdigest()]
 
 
-def _store(path: Path) -> Path:
-    """The file of the cache for a folder."""
+def _store(folder: Path) -> Path:
+    """The file of the cache for a folder; folders beside it have their own."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - it never raises
-    folder = os.path.realpath(path.parent)
-    return Path(base) / "a2g_jax" / "hashes" / f"{hashlib.sha256(os.fsencode(folder)).hexdigest()[:32]}.json"
+    name = hashlib.sha256(os.fsencode(os.path.realpath(folder))).hexdigest()[:32]
+    return Path(base) / "a2g_jax" / "hashes" / f"{name}.json"
 
 
 def _read(store: Path) -> dict[str, Any]:

@@ -44,22 +44,28 @@ def read_apart(path: Path, names: Sequence[str], limits: Limits) -> dict[str, np
         assert process.stdout is not None
         timer = threading.Timer(_SECONDS, process.kill)
         timer.start()
+        error: str | None = None
+        complete = False
         try:
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
-            answer = json.loads(process.stdout.readline() or b"null")
-            if answer is not None and "error" not in answer:
-                return {name: _received(process.stdout, *rest) for name, *rest in answer["arrays"]}
+            answer = json.loads(process.stdout.readline())
+            error = answer.get("error")
+            found = {name: _received(process.stdout, *rest) for name, *rest in answer.get("arrays", ())}
+            complete = True
         except (OSError, ValueError, EOFError):
-            answer = None
+            pass
         finally:
             timer.cancel()
-            if answer is None:
+            # Also after an interrupt: the rest of an answer would be read as the next one.
+            if not complete:
                 _end()
-    if answer is None:
+    if complete and error is None:
+        return found
+    if error is None:
         reason = "the HDF5 library crashed on it, or did not end"
         raise InputError(f"{path}: is damaged ({reason}); copy or download it again.")
-    raise InputError(answer["error"].replace(whole, str(path), 1))
+    raise InputError(error.replace(whole, str(path), 1))
 
 
 def _received(pipe: IO[bytes], kind: str, shape: list[int], size: int) -> np.ndarray:

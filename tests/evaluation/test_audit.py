@@ -83,6 +83,25 @@ def test_an_amplitude_follower_is_flagged(clips):
     assert any("follows loudness alone" in verdict for verdict in result["verdicts"])
 
 
+def test_clips_of_one_recording_count_together(true_generator, clips):
+    """Twice the same clips are no more evidence than once, and a single recording has no interval."""
+    twice, names = [*clips, *clips], [*SPEAKERS, *SPEAKERS]
+
+    def again(audio, seed):
+        return true_generator(audio._replace(clip=audio.clip % 4), seed)
+
+    def interval(recordings):
+        found = listening_audit(again, twice, names, FPS, samples=1, recordings=recordings)
+        assert found["recordings"] == len(set(recordings or range(8)))
+        return found["conditions"]["true audio"]["agreement_interval"]
+
+    low, high = interval(None)
+    # As many clips in each of six recordings as in each of eight, but for two; fewer of them say less.
+    fewer = interval([0, 1, 2, 3, 0, 1, 4, 5])
+    assert fewer[1] - fewer[0] > high - low
+    assert interval([0, 1, 2, 3, 0, 1, 2, 3]) is None
+
+
 def test_a_motion_for_somebody_elses_audio_is_flagged(true_generator, clips):
     """It responds, but what it does is late by half a second to two."""
 

@@ -335,7 +335,10 @@ def test_a_single_recording_is_scored_in_pieces_and_the_report_says_so(corpus):
     pieces = evaluate({}, dataclasses.replace(one, splits={**one.splits, "train": corpus.splits["train"]}), samples=2)
     assert (pieces["about"]["clips"], pieces["about"]["stretches"]) == (3, 1)
     assert pieces["about"]["seconds"] == 12.0
-    assert "pieces of 1 recording(s), which are not independent" in markdown(pieces)
+    text = markdown(pieces)
+    assert "over 1 recording by" in text
+    assert text.count("not independent") == 1
+    assert "over 1 recording." in latex(pieces)
 
 
 def test_a_metric_of_another_package_has_its_column(corpus):

@@ -196,6 +196,21 @@ def test_a_crash_of_the_library_is_one_error_and_the_next_file_is_read(path, mon
     np.testing.assert_array_equal(read_hdf5(path, ["a"])["a"], expected)
 
 
+@pytest.mark.parametrize("place", ["loads", "frombuffer"])
+def test_an_interrupt_leaves_no_rest_of_an_answer(path, monkeypatch, place):
+    with h5py.File(path, "w") as file:
+        file["a"], file["b"] = np.arange(3), np.arange(100)
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr({"loads": hdf5_process.json, "frombuffer": hdf5_process.np}[place], place, interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            read_hdf5(path, ["a", "b"])
+    np.testing.assert_array_equal(read_hdf5(path, ["b"])["b"], np.arange(100))
+
+
 def test_relative_paths_after_a_change_of_the_folder(path, monkeypatch):
     with h5py.File(path, "w") as file:
         file["a"] = np.arange(3)

@@ -85,6 +85,17 @@ def test_files_are_read_again_only_when_they_may_have_changed(tmp_path, cache):
     assert len(cache) == 4
 
 
+def test_folders_side_by_side_keep_their_own(tmp_path, cache):
+    """As corpora and runs do, whose files have the same names."""
+    paths = [tmp_path / folder / "a.npy" for folder in ("one", "two")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_bytes(path.parent.name.encode())
+    first = [cached_sha256(path) for path in paths]
+    assert [cached_sha256(path) for path in paths] == first
+    assert len(cache) == 2
+
+
 def test_a_damaged_cache_or_none_costs_time_alone(tmp_path, cache, monkeypatch):
     path = tmp_path / "a.npy"
     path.write_bytes(b"abc")
