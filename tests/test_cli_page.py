@@ -38,6 +38,11 @@ def test_the_page_has_words_and_links_to_its_files(speech, tmp_path):
         (["generate", "demo", "--audio", "speech.wav", "--transcript", "late.tsv"], "late.tsv: all words start after"),
         (["generate", "demo", "--audio", "speech.wav", "--transcript", "no.tsv"], "no.tsv: there is no such file"),
         (["demo", "--audio", "speech.wav", "--transcript", "speech.wav"], "speech.wav"),
+        (["demo", "--audio", "speech.wav", "--tier", "words"], "--tier: belongs to a transcript"),
+        (
+            ["generate", "demo", "--audio", "speech.wav", "--transcript", "words.tsv", "--formats", "bvh"],
+            "--transcript: its words are shown on the page; add html to --formats",
+        ),
         (["demo", "--transcript", "words.tsv"], "name it with --audio"),
     ],
 )

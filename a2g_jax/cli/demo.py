@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         InputError: audio, a run or a folder that cannot be used, or flags that exclude each other.
     """
     existing_file(options.audio)
-    existing_file(options.transcript)
+    sampling.check_transcript(options)
     if options.transcript is not None and options.audio is None:
         raise InputError("--transcript: belongs to a speech; name it with --audio.")
     chosen = [flag for flag, on in _modes(options).items() if on]

@@ -58,7 +58,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
             raise InputError(f"--{name} is needed (see 'a2g generate --help').")
     clips.check_flags(options, extra)
     existing_file(options.audio)
-    existing_file(options.transcript)
+    sampling.check_transcript(options)
     characters.check(options)
     clips.check_files(options)
     writable_folder(options.out)

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli.argument_types import TIER, count, formats, seed
+from a2g_jax.cli.paths import existing_file
 from a2g_jax.config import check_needs, from_json, parse_flags
+from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import PAGE, format_names, known_formats
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
@@ -50,7 +52,8 @@ def add_arguments(
     parser.add_argument(
         "--transcript",
         metavar="FILE",
-        help="words of the speech with their times, for the page: TextGrid, JSON of Google's speech-to-text, or TSV",
+        help="words of the speech with their times, for the page: TextGrid, TSV, or JSON of Google's speech-to-text,"
+        " Whisper, WhisperX or Gentle",
     )
     parser.add_argument("--tier", metavar="NAME", help=TIER)
     parser.add_argument(
@@ -79,6 +82,19 @@ def sampling_settings(name: str, flags: list[str]) -> Any:
     (changed,) = parse_flags(flags, stored, hint=f"'a2g generate {name} --settings'")
     check_needs(stored, changed, model)
     return changed
+
+
+def check_transcript(options: argparse.Namespace) -> None:
+    """Refuse flags of a transcript that would have no effect.
+
+    Raises:
+        InputError: no such file, no page for its words, or a tier of no transcript.
+    """
+    existing_file(options.transcript)
+    if options.transcript is None and options.tier is not None:
+        raise InputError("--tier: belongs to a transcript; name it with --transcript.")
+    if options.transcript is not None and PAGE not in options.formats:
+        raise InputError(f"--transcript: its words are shown on the page; add {PAGE} to --formats.")
 
 
 def control_flags(options: argparse.Namespace) -> list[str]:

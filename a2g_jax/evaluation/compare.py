@@ -13,6 +13,8 @@ _CONDITIONS = (
     *("skeleton", "corpus", "split", "samples", "clips", "units", "beat_sigma", "wrist_to_wrist"),
     *("feature_network", "emotion_classifier"),
 )
+#: Numbers of every cell, or None.
+_VALUES = ("mean", "low", "high", "best")
 
 
 def check_comparable(results: dict[str, dict[str, Any]]) -> None:
@@ -82,10 +84,41 @@ def read_report(folder: Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{folder}: is no report (no report.json in it); make one with 'a2g evaluate RUN ...'.")
     value = read_json(path)
-    if (
-        not isinstance(value, dict)
-        or not isinstance(value.get("about"), dict)
-        or not isinstance(value.get("rows"), list)
-    ):
+    if not _is_report(value):
         raise InputError(f"{path}: is not a report of 'a2g evaluate'; run that again.")
     return value
+
+
+def _is_report(value: Any) -> bool:
+    """Whether a JSON value has what every report has, also those of 0.1, with values of the right types."""
+    if not isinstance(value, dict) or not isinstance(value.get("about"), dict):
+        return False
+    if not isinstance(value.get("rows"), list) or not isinstance(value.get("audits", {}), dict):
+        return False
+    about, rows = value["about"], value["rows"]
+    right = all(isinstance(about.get(key), str) for key in ("split", "corpus", "package"))
+    right = right and all(_is_number(about.get(key)) for key in ("clips", "samples", "seconds", "seed"))
+    network = about.get("feature_network", 0)  # None where there is none
+    if network is not None:
+        right = right and isinstance(network, str) and _is_number(about.get("feature_vectors")) and "floor" in about
+    return right and isinstance(about.get("recipe"), dict) and all(_is_row(row) for row in rows)
+
+
+def _is_row(row: Any) -> bool:
+    if not isinstance(row, dict) or not isinstance(row.get("scores"), dict):
+        return False
+    cells = row["scores"].values()
+    return (
+        isinstance(row.get("name"), str)
+        and _is_number(row.get("samples"))
+        and all(
+            isinstance(cell, dict)
+            and all(key in cell and (cell[key] is None or _is_number(cell[key])) for key in _VALUES)
+            for cell in cells
+        )
+        and all(map(_is_row, row.get("runs") or ()))
+    )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

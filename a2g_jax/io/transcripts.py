@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from jaxtyping import Int
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_readable, read_json
 from a2g_jax.io.reading import Note, current_reading
+from a2g_jax.io.recognised_words import is_recognised, recognised_words
 from a2g_jax.io.textgrid import read_words_with_notes
 from a2g_jax.io.word_tiers import word_notes
 from a2g_jax.io.words import Word, is_word
@@ -21,6 +22,7 @@ from a2g_jax.io.words import Word, is_word
 _LONGEST = 1e6
 _SECONDS = re.compile(r"[0-9]{1,9}(?:\.[0-9]{0,24})?s?")
 _PREVIEW = 64
+_SUBTITLES = frozenset({".srt", ".vtt", ".ass", ".sbv"})
 _LARGEST_FILE = 2**26
 #: Tolerance as a share of a frame: frame times and word times are both rounded decimals.
 FRAME_SLACK = 1e-6
@@ -34,6 +36,7 @@ def read_transcript(path: str | os.PathLike[str], tier: str | None = None) -> tu
     ==========================  ===========================================================================
     TextGrid (``.TextGrid``)    Praat, the Montreal Forced Aligner; BEAT and BEAT2
     JSON (``.json``)            Google's speech-to-text: Trinity, GENEA 2020. The first alternative counts
+    JSON (``.json``)            Whisper with word times, WhisperX, Gentle. Words without times are left out
     tab-separated (``.tsv``)    ``start<TAB>end<TAB>word`` on each line, in seconds: GENEA 2022 and 2023
     ==========================  ===========================================================================
 
@@ -63,8 +66,9 @@ def transcript_notes(path: str | os.PathLike[str], tier: str | None = None) -> t
     if reader is read_words_with_notes:
         words, notes = read_words_with_notes(path, current_reading().tier if tier is None else tier)
     else:
-        words = tuple(word for word in reader(path) if is_word(word.text))
-        notes = word_notes(words)
+        labels, notes = _json(path) if reader is _json else (reader(path), [])
+        words = tuple(word for word in labels if is_word(word.text))
+        notes = notes + word_notes(words)
     return tuple(sorted(words, key=lambda word: word.start)), notes
 
 
@@ -90,7 +94,7 @@ def words_at_frames(words: Sequence[Word], fps: float, frames: int) -> Int[np.nd
 
 
 def _reader(path: Path) -> Callable[[Path], Any]:
-    by_suffix: dict[str, Callable[[Path], Any]] = {".textgrid": read_words_with_notes, ".json": _google, ".tsv": _table}
+    by_suffix: dict[str, Callable[[Path], Any]] = {".textgrid": read_words_with_notes, ".json": _json, ".tsv": _table}
     reader = by_suffix.get(path.suffix.lower())
     if reader is not None:
         return reader
@@ -100,14 +104,23 @@ def _reader(path: Path) -> Callable[[Path], Any]:
         return read_words_with_notes
     start = start.removeprefix(b"\xef\xbb\xbf").lstrip()
     if start[:1] in (b"[", b"{"):
-        return _google
+        return _json
     if b"\t" in start:
         return _table
+    if path.suffix.lower() in _SUBTITLES or b"-->" in start:
+        raise InputError(
+            f"{path}: is not a transcript in a supported form: subtitles have times of phrases, not of words; name the"
+            " recogniser's JSON with word times (whisper --word_timestamps True, whisperx), or a TextGrid."
+        )
     raise InputError(f"{path}: is not a transcript in a supported form; expected a TextGrid, JSON or TSV file.")
 
 
-def _google(path: Path) -> Iterator[Word]:
-    results = read_json(path)
+def _json(path: Path) -> tuple[Iterable[Word], list[Note]]:
+    value = read_json(path)
+    return recognised_words(path, value, _word) if is_recognised(value) else (_google(path, value), [])
+
+
+def _google(path: Path, results: Any) -> Iterator[Word]:
     if isinstance(results, dict):
         results = results.get("results")
     for number, result in enumerate(_list(path, results, "the file")):
@@ -126,7 +139,8 @@ def _google(path: Path) -> Iterator[Word]:
 def _list(path: Path, value: Any, place: str) -> list[Any]:
     if not isinstance(value, list):
         raise InputError(
-            f"{path}: {place}: expected a list as Google's speech-to-text writes, with 'alternatives' and 'words'."
+            f"{path}: {place}: expected a list as Google's speech-to-text writes, with 'alternatives' and 'words', or"
+            " the JSON of Whisper, WhisperX or Gentle."
         )
     return value
 

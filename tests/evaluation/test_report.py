@@ -1,5 +1,6 @@
 """Tables and pictures of made-up scores: dashes, bold, widths, escapes and cut bars."""
 
+import json
 import re
 import string
 
@@ -9,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from a2g_jax.errors import InputError
 from a2g_jax.evaluation import latex_text
-from a2g_jax.evaluation.report import latex, markdown, write_report
+from a2g_jax.evaluation.report import latex, markdown, read_report, write_report
 from a2g_jax.evaluation.report_cells import best_runs
 from a2g_jax.evaluation.report_latex import TEXT_WIDTH
 from a2g_jax.evaluation.report_picture import FACTOR, limit_of
@@ -252,3 +254,26 @@ class TestPicture:
         assert written.count(" [-]") == 1
         assert written.count("-") >= 2
         assert "null" in (tmp_path / "report" / "report.json").read_text()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda report: report["about"].pop("split"),
+        lambda report: report["about"].update(clips="3"),
+        lambda report: report["about"].update(feature_network=3),
+        lambda report: report["rows"].append(1),
+        lambda report: report["rows"][0].pop("name"),
+        lambda report: next(iter(report["rows"][0]["scores"].values())).update(mean="7"),
+        lambda report: next(iter(report["rows"][0]["scores"].values())).pop("low"),
+    ],
+)
+def test_a_file_that_is_no_report_is_one_error(full, tmp_path, change):
+    text = json.dumps(full)
+    (tmp_path / "report.json").write_text(text)
+    assert read_report(tmp_path) == json.loads(text)
+    report = json.loads(text)
+    change(report)
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    with pytest.raises(InputError, match="is not a report of 'a2g evaluate'"):
+        read_report(tmp_path)

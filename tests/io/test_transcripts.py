@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.textgrid import read_words, write_words
-from a2g_jax.io.transcripts import read_transcript, words_at_frames
+from a2g_jax.io.transcripts import read_transcript, transcript_notes, words_at_frames
 from a2g_jax.io.words import Word, is_word
 from tests.io.fuzz_for_tests import damaged
 from tests.io.untrusted_checks import check_message
@@ -32,6 +32,23 @@ GOOGLE = [
     {"alternatives": [{"transcript": ""}]},
     {"alternatives": [{"words": [{"startTime": "2s", "endTime": 2.5, "word": " it's\n"}]}]},
 ]
+TIMED = [{"start": 0.4, "end": 0.9}, {"start": 0.9, "end": 1.25}, {"start": 2, "end": 2.5}]
+WHISPER = {
+    "text": " hello wörld it's",
+    "segments": [
+        {"id": 0, "text": " hello wörld", "words": [{"word": " hello", **TIMED[0]}, {"word": " wörld", **TIMED[1]}]},
+        {"id": 1, "text": "", "words": []},
+        {"id": 2, "text": " it's", "words": [{"text": "it's", **TIMED[2], "confidence": 0.9}]},
+    ],
+    "language": "en",
+}
+GENTLE = {
+    "transcript": "hello wörld it's",
+    "words": [
+        {"word": word.text, "alignedWord": word.text, "case": "success", **times, "phones": []}
+        for word, times in zip(WORDS, TIMED, strict=True)
+    ],
+}
 TABLE = "0.4\t0.9\thello\r\n0.900000\t1.25\twörld\r\n\r\n2\t2.5\tit's\r\n"
 
 
@@ -50,6 +67,9 @@ def write(path, content):
 FORMS = {
     "google.json": json.dumps(GOOGLE),
     "camel.json": json.dumps({"results": GOOGLE}, ensure_ascii=False),
+    "whisper.json": json.dumps(WHISPER),
+    "gentle.json": json.dumps(GENTLE),
+    "gentle.txt": json.dumps(GENTLE),
     "table.tsv": TABLE,
     "grid.TextGrid": grid,
     "marked.tsv": b"\xef\xbb\xbf" + TABLE.encode(),
@@ -73,6 +93,15 @@ def test_text_grids_without_a_suffix_in_either_encoding(tmp_path):
 def test_a_missing_start_is_zero_as_google_leaves_it_out(tmp_path):
     results = [{"alternatives": [{"words": [{"end_time": "0.5s", "word": "so"}]}]}]
     assert read_transcript(write(tmp_path / "a.json", json.dumps(results))) == (Word("so", 0.0, 0.5),)
+
+
+def test_words_that_an_aligner_did_not_find_are_counted(tmp_path):
+    words = [*GENTLE["words"], {"word": "5"}, {"word": "x", "start": None, "end": None}]
+    path = write(tmp_path / "a.json", json.dumps({"segments": [{"words": words}]}))
+    found, notes = transcript_notes(path)
+    assert found == WORDS
+    assert [(note.code, note.value) for note in notes] == [("untimed", 2)]
+    assert "2 of 5 words have no times and are left out." in str(notes[0])
 
 
 def test_words_come_in_the_order_of_their_starts(tmp_path):
@@ -111,8 +140,17 @@ WRONG = {
     "a.json, line 1, column 2: is not JSON": "[",
     "a.json: is nested too deeply": "[" * 100_000,
     "a.json: contains NaN": google({**GOOD, "end_time": float("nan")}),
+    "a.json: segment 1: has no list of 'words'; transcribe with word times": '{"segments": [{"text": "a"}]}',
+    "a.json: segment 1, word 2: expected an object with 'word'": json.dumps(
+        {"words": [GENTLE["words"][0], {"start": 0, "end": 1}]}
+    ),
+    "a.json: segment 1, word 1: ends at 0.5 s, before it starts at 1.0 s": '{"words": [{"word": "a", "start": 1, "end":'
+    " 0.5}]}",
+    "a.json: none of its 1 words has a time": '{"words": [{"word": "a", "case": "not-found-in-audio"}]}',
+    "a.vtt: is not a transcript in a supported form: subtitles": "WEBVTT\n\n00:01.000 --> 00:02.000\nhello\n",
+    "a.srt: is not a transcript in a supported form: subtitles have times of phrases": "1\n00:00:01 --> 00:00:02\na\n",
+    "b.txt: is not a transcript in a supported form: subtitles": "1\n00:00:01,000 --> 00:00:02,000\nhello\n",
     "a.txt: is not a transcript in a supported form": "hello",
-    "a.srt: is not a transcript in a supported form": "1\n00:00:01 --> 00:00:02\nhello\n",
     "a.TextGrid, line 1: expected a TextGrid text file": "hello",
     "a.tsv: is empty": "",
 }
@@ -159,7 +197,7 @@ def test_round_trip(words, tmp_path_factory):
     assert read_transcript(write(folder / "round.json", json.dumps(results))) == words
 
 
-@pytest.mark.parametrize("name", ["google.json", "table.tsv", "grid.TextGrid"])
+@pytest.mark.parametrize("name", ["google.json", "whisper.json", "gentle.json", "table.tsv", "grid.TextGrid"])
 @settings(max_examples=120, deadline=None)
 @given(data=st.data())
 def test_damaged_bytes(name, data, tmp_path_factory):
