@@ -58,8 +58,8 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
             raise InputError(f"--{name} is needed (see 'a2g generate --help').")
     clips.check_flags(options, extra)
     existing_file(options.audio)
-    sampling.check_transcript(options)
     characters.check(options)
+    sampling.check_transcript(options)  # after the formats are settled
     clips.check_files(options)
     writable_folder(options.out)
 
