@@ -4,7 +4,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -99,10 +99,18 @@ def train(
         corpus.array(name)
     if settings.mirror > 0:
         pose_mirror(config.space)
+    created = not out.exists()
     make_folder(out)
-    with locked(out / LOCK, f"{out}: is being trained"):
-        config = replace(config, body_extremes=extremes)
-        return _train(config, corpus, recordings, out, model, shape, resume, progress, start)
+    try:
+        with locked(out / LOCK, f"{out}: is being trained"):
+            config = replace(config, body_extremes=extremes)
+            return _train(config, corpus, recordings, out, model, shape, resume, progress, start)
+    except InputError:
+        # Some errors are found in a locked folder only, such as word vectors of another length.
+        if created:
+            with suppress(OSError):  # it is not empty
+                out.rmdir()
+        raise
 
 
 def _train(

@@ -430,7 +430,7 @@ class TestObjective:
         for number in range(3):
             moved = jax.tree.map(lambda leaf, n=number: leaf + 0.1 * (n + 1), params["generator"])
             params = params | {"generator": moved}
-            loss = lambda own, p=params: update.loss({**p, **own}, None, batch, 0)[0]  # noqa: E731
+            loss = lambda own, p=params: update.loss({**p, **own}, jax.random.key(0), batch, jnp.int32(0))[0]  # noqa: E731
             value, gradient = jax.value_and_grad(loss)({"average": params["average"]})
             assert value == 0
             state = optimiser.init(gradient) if state is None else state
