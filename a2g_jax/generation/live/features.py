@@ -21,13 +21,13 @@ _FORGET = 30.0
 class LiveFeatures:
     """Rows of log-mel features, not normalised, as soon as their samples are there.
 
-    As :func:`~a2g_jax.features.mel.log_mel`, with causal forms of what it finds out from a whole recording. The level is
-    that of the speech so far (:class:`~a2g_jax.generation.live.loudness.Loudness`). A constant offset is removed by a
-    high-pass of 3 Hz. The loudest band, from which the floor is measured, is the loudest so far; it starts at that of
+    As :func:`~a2g_jax.features.mel.log_mel`, with causal forms of what it finds out from a whole recording. The level
+    is that of the speech so far (:class:`~a2g_jax.generation.live.loudness.Loudness`). A constant offset is removed by
+    a high-pass of 3 Hz. The loudest band, from which the floor is measured, is the loudest so far; it starts at that of
     speech at the target level, and falls back to it with a time constant of 30 s.
     """
 
-    def __init__(self, config: MelConfig, fps: float, sample_rate: int) -> None:
+    def __init__(self, config: MelConfig, fps: float, sample_rate: float) -> None:
         """
         Args:
             fps: frames of the motion per second.

@@ -37,9 +37,9 @@ class _Frame(NamedTuple):
 class Feet:
     """The motion of local rotations that arrive a few frames at a time: a root over the feet, and feet that stand.
 
-    The causal form of :func:`~a2g_jax.geometry.ground.plant_feet` and :func:`~a2g_jax.geometry.footholds.lock_feet`: the
-    root is smoothed over 0.2 s; a foothold is the mean of the first moments of a stand, and a foot moves over to it, or
-    to its own path before it steps, in 0.13 s. Spine, arms and head are kept within the bounds of the body.
+    The causal form of :func:`~a2g_jax.geometry.ground.plant_feet` and :func:`~a2g_jax.geometry.footholds.lock_feet`:
+    the root is smoothed over 0.2 s; a foothold is the mean of the first moments of a stand, and a foot moves over to
+    it, or to its own path before it steps, in 0.13 s. Spine, arms and head are kept within the bounds of the body.
     """
 
     def __init__(self, config: RunConfig, hop: int) -> None:
@@ -57,7 +57,7 @@ class Feet:
         self._ankles = [] if body is None else [body[BODY_JOINTS.index(f"{side}_Ankle")] for side in "LR"]
         legs = find_legs(still)
         self._axes = {leg: knee_axis(still, leg) for leg in legs}
-        world, places = self._places(np.asarray(self._mean, np.float64)[None], self._start[None])
+        places = self._places(np.asarray(self._mean, np.float64)[None], self._start[None])[1]
         self._middle = places[0, self._ankles].mean(axis=0) if self._ankles else self._start
         reach = max(1, round(_REACH * fps)) if self._ankles else 0
         weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (_SMOOTHING * fps)) ** 2)

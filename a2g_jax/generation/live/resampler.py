@@ -22,7 +22,7 @@ class Resampler:
     not depend on how the input was cut, to the last bit.
     """
 
-    def __init__(self, from_rate: int, rate: int, group: int) -> None:
+    def __init__(self, from_rate: float, rate: int, group: int) -> None:
         """
         Args:
             from_rate: of the input, Hz, 8000 to 192000.
@@ -32,7 +32,7 @@ class Resampler:
         Raises:
             InputError: another rate.
         """
-        check_rate(from_rate)
+        from_rate = check_rate(from_rate)
         divisor = gcd(from_rate, rate)
         self._up, self._down, self.group = rate // divisor, from_rate // divisor, group
         self._from_rate, self._rate = from_rate, rate
@@ -80,14 +80,15 @@ class Resampler:
         return np.asarray(filters / filters.sum(axis=1, keepdims=True), np.float32)
 
 
-def check_rate(rate: int) -> None:
-    """Refuse sample rates that no microphone has.
+def check_rate(rate: float) -> int:
+    """A sample rate of a microphone as a whole number.
 
     Raises:
         InputError: not a whole number from 8000 to 192000.
     """
-    if isinstance(rate, bool) or rate != int(rate) or not LOWEST_RATE <= rate <= HIGHEST_RATE:
+    if isinstance(rate, bool) or not LOWEST_RATE <= rate <= HIGHEST_RATE or rate != int(rate):
         raise InputError(
             f"sample_rate: expected a whole number from {LOWEST_RATE} to {HIGHEST_RATE} Hz, the rate of the samples"
             f" that are pushed; got {rate}."
         )
+    return int(rate)

@@ -10,6 +10,7 @@ from a2g_jax.features.samples import mono_samples
 from a2g_jax.generation.live.features import LiveFeatures
 from a2g_jax.generation.live.feet import Feet
 from a2g_jax.generation.live.poses import PoseProgram, Poses
+from a2g_jax.generation.live.resampler import check_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.training.run import Run
@@ -40,9 +41,9 @@ class Latency:
 class Stream:
     """Generates motion for speech while it arrives, in bounded memory.
 
-    The motion does not depend on how the samples are cut into pushes, to the last bit: ``stream_offline`` gives the same
-    from one push of everything. It is not the motion of :class:`~a2g_jax.generation.generator.Generator`, which finds
-    out the level and the offset of a recording, and where feet stand, from all of it.
+    The motion does not depend on how the samples are cut into pushes, to the last bit: :func:`stream_offline` gives
+    the same from one push of everything. It is not the motion of :class:`~a2g_jax.generation.generator.Generator`,
+    which finds out the level and the offset of a recording, and where feet stand, from all of it.
 
     Example:
         >>> stream = Stream(open_run("demo-flow"), sample_rate=48000)  # doctest: +SKIP
@@ -51,7 +52,7 @@ class Stream:
     """
 
     def __init__(
-        self, run: Run, sample_rate: int = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
+        self, run: Run, sample_rate: float = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
     ) -> None:
         """
         Args:
@@ -72,7 +73,7 @@ class Stream:
             raise InputError(f"lookahead: expected seconds, 0 or more; got {lookahead}.")
         fps = run.config.fps
         ahead = None if lookahead is None else round(lookahead * fps)
-        self.run, self.sample_rate, self._seed = run, sample_rate, _seed(seed)
+        self.run, self.sample_rate, self._seed = run, check_rate(sample_rate), _seed(seed)
         self._program = PoseProgram(run, max(1, round(HOP * fps)), ahead)
         self._start()
 
@@ -164,7 +165,7 @@ class Stream:
 
 
 def stream_offline(
-    run: Run, audio: Any, sample_rate: int = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
+    run: Run, audio: Any, sample_rate: float = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
 ) -> Motion:
     """The whole motion of a stream for a recording: one push of everything.
 
@@ -176,7 +177,7 @@ def stream_offline(
 
 
 def _seed(seed: int) -> int:
-    if isinstance(seed, bool) or seed != int(seed) or not 0 <= seed < 2**32:
+    if isinstance(seed, bool) or not 0 <= seed < 2**32:
         raise InputError(f"seed: expected a whole number from 0 to {2**32 - 1}; got {seed}.")
     return int(seed)
 
