@@ -27,7 +27,7 @@ class LiveFeatures:
     speech at the target level, and falls back to it with a time constant of 30 s.
     """
 
-    def __init__(self, config: MelConfig, fps: float, sample_rate: float) -> None:
+    def __init__(self, config: MelConfig, fps: float, sample_rate: int | float) -> None:
         """
         Args:
             fps: frames of the motion per second.

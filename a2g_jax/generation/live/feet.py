@@ -21,8 +21,8 @@ _SMOOTHING, _REACH = 0.1, 0.1
 _SPEED_SPAN, _CHANGE = 0.067, 0.133
 #: A foot steps while it moves faster than this, m/s, or is higher than this above its lowest, metres.
 _STEP_SPEED, _STEP_HEIGHT = 0.4, 0.05
-#: A foothold is left when the model's foot is so far from it, metres and degrees.
-_FARTHEST, _TURNED = 0.1, 25.0
+#: A foothold is left, in as many seconds, when the model's foot is so far from it, metres and degrees.
+_FARTHEST, _TURNED, _LEAVING = 0.2, 45.0, 0.6
 #: The lowest height of a foot rises at this speed, m/s, and a lowered root with this time constant, seconds.
 _RISE, _RAISE = 0.01, 0.4
 
@@ -144,8 +144,8 @@ class _Foot:
     def __init__(self, leg: Leg, lowest: float, fps: float, lead: int) -> None:
         self.leg, self._fps, self._lead = leg, fps, lead
         self._lowest = lowest
-        #: Weight of the foothold, in steps of a frame from 0 to ``lead``.
-        self._weight = lead
+        #: Weight of the foothold, from 0 to 1, before it is smoothed.
+        self._weight = 1.0
         self._place: np.ndarray | None = None
         self._turn: np.ndarray | None = None
         self._leaves = False
@@ -165,7 +165,7 @@ class _Foot:
         moved = (path[2 * span :] - path[: len(path) - 2 * span])[:, [0, 2]]
         speed = np.linalg.norm(moved, axis=-1).max() * self._fps / (2 * span)
         stands = speed <= _STEP_SPEED and ahead[:, 1].max() <= self._lowest + _STEP_HEIGHT
-        if self._place is None or (self._weight == 0 and stands):
+        if self._place is None or (self._weight == 0.0 and stands):
             self._place = ahead.mean(axis=0)
             self._turn = Rotation.from_matrix(turns[span : span + self._lead + 1]).mean().as_matrix()
             self._leaves = False
@@ -173,7 +173,11 @@ class _Foot:
         turn = (Rotation.from_matrix(self._turn) * own.inv()).as_rotvec()
         off, turned = self._place - path[span], np.degrees(np.linalg.norm(turn))
         self._leaves |= bool(np.linalg.norm(off) > _FARTHEST or turned > _TURNED)
-        self._weight = int(np.clip(self._weight + (1 if stands and not self._leaves else -1), 0, self._lead))
-        u = self._weight / self._lead
+        step = 1.0 / self._lead
+        if stands and self._leaves:
+            step = -1.0 / (_LEAVING * self._fps)
+        elif not stands:
+            step = -step
+        u = self._weight = float(np.clip(self._weight + step, 0.0, 1.0))
         share = u * u * (3.0 - 2.0 * u)
         return path[span] + share * off, (Rotation.from_rotvec(share * turn) * own).as_matrix()

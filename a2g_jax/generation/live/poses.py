@@ -1,12 +1,11 @@
 """A model's poses a few frames at a time, from features that arrive row by row."""
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import check_stored, sampled
@@ -15,6 +14,8 @@ from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.training.run import Run
 
+#: Poses that the next ones are joined to, and the time constant in frames with which an offset at a join fades.
+JOINED, FADE = 2, 3.0
 #: Longest timeline of requests that is tried, seconds.
 _LONGEST = 4 * 3600.0
 #: Fields of a condition that are supplied while speech arrives; of others, a model gets None.
@@ -37,8 +38,8 @@ class PoseProgram:
         """
         Args:
             hop: frames of a call.
-            lookahead: frames of speech after its own that a frame may depend on; None for those of the model. With
-                fewer, the last row of features stands for what has not been said yet.
+            lookahead: frames of speech after its own that a frame waits for; None for those of the model. With fewer,
+                the last row of features stands for what has not been said yet.
 
         Raises:
             InputError: the model generates no motion from audio, or needs more than audio, or the whole motion.
@@ -49,31 +50,46 @@ class PoseProgram:
         _check(run, model)
         # Whatever the model does with the frames around them is over after its halo.
         most = model.halo if model.begin is None else max(model.lookahead, model.overlap)
-        self.lookahead = most if lookahead is None else min(lookahead, most)
-        self.before = model.halo
+        least = 0 if model.begin is None else model.overlap
+        self.lookahead = most if lookahead is None else max(least, min(lookahead, most))
+        self.before = model.halo + (JOINED if model.begin is None else 0)
         autoregressive = model.begin is not None
         after = hop + most
         # Windows of ``sample`` begin at multiples of the block, and are blocks long.
         self.rows = self.before + after if autoregressive else -(-(BLOCK - 1 + self.before + after) // BLOCK) * BLOCK
         self._params, self._summary = jax.device_put(run.params), jax.device_put(run.summary)
         self._requests = _requests(run, model)
-        space, condition, width = config.space, model.condition, hop + model.overlap
+        space, condition, overlap = config.space, model.condition, model.overlap
 
         def step(params, summary, key, given, start, skipped, state):
             context = condition(params, summary, given)
             if model.proceed is None:
                 pose = model.sample(params, summary, key, context, start)
-                return space.valid(jax.lax.dynamic_slice_in_dim(pose, skipped, hop)), state
-            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, skipped, width), context)
-            pose, state = model.proceed(params, summary, key, cut, start + skipped, state)
-            return space.valid(pose), state
+                # With the frames before, which were shown with less of the speech, and are continued from.
+                pose = space.valid(jax.lax.dynamic_slice_in_dim(pose, skipped - JOINED, hop + JOINED))
+                pose = jnp.concatenate([state.before, continued(pose, state)])
+                return space.valid(pose[JOINED:]), _State(jnp.bool_(False), pose[hop:])
+            # Each frame has one context, that of its first call: windows that overlap would otherwise not agree.
+            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, skipped, hop + overlap), context)
+            cut = jax.tree.map(
+                lambda new, old: new.at[: len(old)].set(jnp.where(state.first, new[: len(old)], old)), cut, state.before
+            )
+            pose, own = model.proceed(params, summary, key, cut, start + skipped, state.own)
+            return space.valid(pose), _State(jnp.bool_(False), jax.tree.map(lambda array: array[hop:], cut), own)
 
-        self._step = jax.jit(step)
-        self._begin = jax.jit(partial(_begin, model.begin))
+        def begin(params, summary, given, seed):
+            key = jax.random.fold_in(jax.random.key(seed), 0)
+            if model.begin is None:
+                return key, _State(jnp.bool_(True), jnp.zeros((JOINED, *space.shape)))
+            before = jax.tree.map(lambda array: array[:overlap], condition(params, summary, given))
+            return key, _State(jnp.bool_(True), before, model.begin(params, summary, key, None))
+
+        self._step, self._begin = jax.jit(step), jax.jit(begin)
 
     def begin(self, seed: int) -> tuple[Any, Any]:
         """Key and state before frame 0 of sample 0 of a seed."""
-        return self._begin(self._params, self._summary, jnp.uint32(seed))
+        window = np.zeros((self.rows, self.run.config.mel.width), np.float32)
+        return self._begin(self._params, self._summary, self._given(window, 0), np.uint32(seed))
 
     def first_row(self, frame: int) -> int:
         """Number of the first row of the window of the frames from ``frame`` on."""
@@ -89,14 +105,17 @@ class PoseProgram:
             window: normalised features from row ``first_row(frame)`` on.
         """
         first = self.first_row(frame)
+        numbers = np.int32(first), np.int32(frame - first)
+        given = self._given(window, first)
+        pose, state = self._step(self._params, self._summary, key, given, *numbers, state)
+        return np.asarray(pose), state
+
+    def _given(self, window: Float[np.ndarray, "rows bands"], first: int) -> Condition:
         curves, fields = self._requests
         controls = None if curves is None else sampled(curves, first, self.rows, self.run.config.fps)
         rows = np.arange(first, first + self.rows)
         others = {name: array[np.clip(rows, 0, len(array) - 1)] for name, array in (fields or {}).items()}
-        given = Condition(window, controls=controls, **others)
-        numbers = np.int32(first), np.int32(frame - first)
-        pose, state = self._step(self._params, self._summary, key, given, *numbers, state)
-        return np.asarray(pose), state
+        return Condition(window, controls=controls, **others)
 
     def compilations(self) -> int:
         """Programs compiled so far."""
@@ -136,9 +155,30 @@ class Poses:
         return np.asarray(self.program.run.config.statistics["audio"].normalise(row), np.float32)
 
 
-def _begin(begin: Any, params: Any, summary: Any, seed: Any) -> tuple[Any, Any]:
-    key = jax.random.fold_in(jax.random.key(seed), 0)
-    return key, None if begin is None else begin(params, summary, key, None)
+class _State(NamedTuple):
+    """State between calls."""
+
+    first: Any
+    """Whether there was no call yet; the frames before are then those of the first call."""
+    before: Any
+    """Of models without a state, the last poses; of others, contexts of the frames that the model reads again."""
+    own: Any = None
+    """State of the model."""
+
+
+def continued(pose: Float[Array, "frames R D"], state: _State) -> Float[Array, "hop R D"]:
+    """The poses after the first :data:`JOINED`, moved so that they follow the last ones that were shown.
+
+    The offset from what was shown, and that of its speed, fade out as a critically damped spring does. It is zero where
+    the model has all of the speech that it depends on.
+
+    Args:
+        pose: those of the frames that were shown, too.
+    """
+    offset = jnp.where(state.first, 0.0, state.before - pose[:JOINED])
+    place, speed = offset[-1:], offset[-1:] - offset[-2:-1]
+    time = (1.0 + jnp.arange(len(pose) - JOINED, dtype=pose.dtype))[:, None, None]
+    return pose[JOINED:] + (place + (speed + place / FADE) * time) * jnp.exp(-time / FADE)
 
 
 def _check(run: Run, model: Any) -> None:

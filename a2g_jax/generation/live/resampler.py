@@ -22,7 +22,7 @@ class Resampler:
     not depend on how the input was cut, to the last bit.
     """
 
-    def __init__(self, from_rate: float, rate: int, group: int) -> None:
+    def __init__(self, from_rate: int | float, rate: int, group: int) -> None:
         """
         Args:
             from_rate: of the input, Hz, 8000 to 192000.
@@ -80,7 +80,7 @@ class Resampler:
         return np.asarray(filters / filters.sum(axis=1, keepdims=True), np.float32)
 
 
-def check_rate(rate: float) -> int:
+def check_rate(rate: int | float) -> int:
     """A sample rate of a microphone as a whole number.
 
     Raises:

@@ -52,7 +52,13 @@ class Stream:
     """
 
     def __init__(
-        self, run: Run, sample_rate: float = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
+        self,
+        run: Run,
+        sample_rate: int | float = 48000,
+        seed: int = 0,
+        *,
+        lookahead: float | None = None,
+        **sampling: Any,
     ) -> None:
         """
         Args:
@@ -165,7 +171,13 @@ class Stream:
 
 
 def stream_offline(
-    run: Run, audio: Any, sample_rate: float = 48000, seed: int = 0, *, lookahead: float | None = None, **sampling: Any
+    run: Run,
+    audio: Any,
+    sample_rate: int | float = 48000,
+    seed: int = 0,
+    *,
+    lookahead: float | None = None,
+    **sampling: Any,
 ) -> Motion:
     """The whole motion of a stream for a recording: one push of everything.
 
