@@ -60,6 +60,7 @@ class Feet:
         places = self._places(np.asarray(self._mean, np.float64)[None], self._start[None])[1]
         self._middle = places[0, self._ankles].mean(axis=0) if self._ankles else self._start
         reach = max(1, round(_REACH * fps)) if self._ankles else 0
+        self._reach = reach
         weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (_SMOOTHING * fps)) ** 2)
         self._weights = weights / weights.sum()
         self._span = max(1, round(_SPEED_SPAN * fps))
@@ -96,7 +97,7 @@ class Feet:
 
     def _smoothed(self, frame: _Frame) -> _Frame:
         """The frame in the middle of those that its root is smoothed over; before the first frame is the same."""
-        while len(self._rough) < self._rough.maxlen - 1:
+        while len(self._rough) < 2 * self._reach:
             self._rough.append(frame)
         self._rough.append(frame)
         root = self._weights @ np.stack([one.root for one in self._rough])
@@ -105,7 +106,7 @@ class Feet:
     def _goals(self, frame: _Frame) -> tuple[_Frame, np.ndarray, np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
         """The frame that the feet are decided for, its joints, and where each ankle goes."""
         world, places = (array[0] for array in self._places(frame.rotations[None], frame.root[None]))
-        while len(self._planted) < self._planted.maxlen - 1:
+        while len(self._planted) < 2 * self._span + self._lead:
             self._planted.append((frame, world, places))
         self._planted.append((frame, world, places))
         goals = []

@@ -115,11 +115,13 @@ class PoseProgram:
         controls = None if curves is None else sampled(curves, first, self.rows, self.run.config.fps)
         rows = np.arange(first, first + self.rows)
         others = {name: array[np.clip(rows, 0, len(array) - 1)] for name, array in (fields or {}).items()}
-        return Condition(window, controls=controls, **others)
+        fields_of: dict[str, Any] = {"audio": window, "controls": controls, **others}
+        return Condition(**fields_of)
 
     def compilations(self) -> int:
         """Programs compiled so far."""
-        return int(self._step._cache_size() + self._begin._cache_size())
+        compiled: tuple[Any, Any] = self._step, self._begin
+        return sum(int(one._cache_size()) for one in compiled)
 
 
 class Poses:

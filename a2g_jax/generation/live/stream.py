@@ -148,6 +148,10 @@ class Stream:
         self._frames = frames
         return motion.clip(0, motion.frames - more)
 
+    _samples: int
+    _frames: int
+    _finished: bool
+
     def _start(self) -> None:
         config = self.run.config
         self._features = LiveFeatures(config.mel, config.fps, self.sample_rate)
