@@ -22,6 +22,7 @@ _EXPORTS = {
     "Run": "a2g_jax.training.run_config",
     "RunConfig": "a2g_jax.training.run_config",
     "Skeleton": "a2g_jax.geometry.skeleton",
+    "Stream": "a2g_jax.generation.live.stream",
     "Style": "a2g_jax.generation.stylized_flow.style",
     "check_motion": "a2g_jax.metrics.body.check",
     "control_rows": "a2g_jax.generation.controls",

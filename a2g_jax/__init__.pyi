@@ -9,6 +9,7 @@ from a2g_jax.generation.delivery import Delivery as Delivery
 from a2g_jax.generation.emotion_gesture.emotion_space import EmotionSpace as EmotionSpace
 from a2g_jax.generation.export import export as export
 from a2g_jax.generation.generator import Generator as Generator
+from a2g_jax.generation.live.stream import Stream as Stream
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style as Style
 from a2g_jax.geometry.motion import Motion as Motion

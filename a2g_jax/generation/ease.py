@@ -55,11 +55,27 @@ def ease(
         rows = weight > 0.0
         joint = reference.joints[role]
         if figure == "bend":
-            eased = _within_flexion(motion, role, bounds, weight)
+            eased = _within_flexion(np.asarray(motion.rotations), role, bounds, weight)
         else:
             eased = _within_range(rotations[:, joint], role, bounds, weight)
         rotations[rows, joint] = eased[rows]
     return replace(motion, rotations=rotations.astype(np.float32))
+
+
+def within_bounds(rotations: Float[np.ndarray, "T J 3 3"], bounds: BodyBounds) -> Float[np.ndarray, "T J 3 3"]:
+    """Local rotations whose spine, arms and head lie within the bounds in every frame.
+
+    Each frame is a function of itself alone, so that this also works on motion whose later frames do not exist yet.
+    """
+    reference = bounds.reference
+    eased = np.asarray(rotations, np.float64).copy()
+    whole = np.ones(len(eased))
+    for role in sorted(_EASED & reference.joints.keys()):
+        joint = reference.joints[role]
+        if role in reference.hinges:
+            eased[:, joint] = _within_flexion(eased, role, bounds, whole)
+        eased[:, joint] = _within_range(eased[:, joint], role, bounds, whole)
+    return eased
 
 
 def _weight(outside: Bool[np.ndarray, " T"], fixed: Bool[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " T"]:
@@ -81,15 +97,15 @@ def _smooth(u: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
 
 
 def _within_flexion(
-    motion: Motion, role: str, bounds: BodyBounds, weight: Float[np.ndarray, " T"]
+    rotations: Float[np.ndarray, "T J 3 3"], role: str, bounds: BodyBounds, weight: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "T 3 3"]:
     """Rotations of a hinge turned about its axis, so that its flexion lies within the bounds where the weight is 1."""
     number, joint = bounds.reference.hinges.index(role), bounds.reference.joints[role]
-    flexion = bounds.reference.figures(motion)["bend"][:, number].astype(np.float64)
+    flexion = bounds.reference.hinge_figures(rotations)["bend"][:, number].astype(np.float64)
     wanted = _compressed(flexion, bounds.high["bend"][number])
     wanted = -_compressed(-wanted, bounds.high["backwards"][number])
     turn = Rotation.from_rotvec(np.radians(weight * (wanted - flexion))[:, None] * bounds.reference.axes[number])
-    return np.asarray((turn * Rotation.from_matrix(np.asarray(motion.rotations[:, joint]))).as_matrix())
+    return np.asarray((turn * Rotation.from_matrix(rotations[:, joint])).as_matrix())
 
 
 def _within_range(

@@ -76,11 +76,45 @@ def reach_goals(motion: Motion, goals: Mapping[Leg, Goal], lowering: Float[np.nd
     lower = _smooth_above(lower, motion.fps)
     if lowering is not None:
         lower = lower * lowering
+    return bend_legs(motion, places, world, goals, lower)
+
+
+def too_far(
+    motion: Motion, leg: Leg, hip: Float[np.ndarray, "T 3"], target: Float[np.ndarray, "T 3"]
+) -> Float[np.ndarray, " T"]:
+    """Metres by which a hip has to be lower for the leg to reach its target; 0 where it does, 5 cm at most."""
+    return _too_far(hip, target, _REACH * _length(motion, leg))
+
+
+def knee_axis(motion: Motion, leg: Leg) -> Float[np.ndarray, "3"]:
+    """Axis about which the knee of a leg bends in a motion, in the frame of the hip joint."""
+    world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
+    offsets = np.asarray(motion.skeleton.offsets, np.float64)
+    thigh, shin = world[:, leg.hip] @ offsets[leg.knee], world[:, leg.knee] @ offsets[leg.ankle]
+    return _bend_axis(motion, world, leg, thigh, shin)
+
+
+def bend_legs(
+    motion: Motion,
+    places: Float[np.ndarray, "T J 3"],
+    world: Float[np.ndarray, "T J 3 3"],
+    goals: Mapping[Leg, Goal],
+    lower: Float[np.ndarray, " T"],
+    axes: Mapping[Leg, Float[np.ndarray, "3"]] | None = None,
+) -> Motion:
+    """The motion with its root lowered and ankles at their goals.
+
+    Args:
+        places: of the joints of the motion.
+        world: their orientations.
+        lower: metres.
+        axes: of knees, see :func:`knee_axis`; by default those of this motion.
+    """
     rotations = np.asarray(motion.rotations, np.float64).copy()
     for leg, (target, orientation) in goals.items():
         hip = places[:, leg.hip].copy()
         hip[:, 1] -= lower
-        _reach(motion, rotations, world, leg, hip, target, orientation)
+        _reach(motion, rotations, world, leg, hip, target, orientation, None if axes is None else axes[leg])
     root = np.asarray(motion.root, np.float64).copy()
     root[:, 1] -= lower
     return replace(motion, rotations=rotations.astype(np.float32), root=root.astype(np.float32))
@@ -174,11 +208,14 @@ def _reach(
     hip: Float[np.ndarray, "T 3"],
     target: Float[np.ndarray, "T 3"],
     orientation: Float[np.ndarray, "T 3 3"],
+    bend_axis: Float[np.ndarray, "3"] | None = None,
 ) -> None:
     """Write the leg's local rotations that put its ankle on the target with that orientation."""
     offsets = np.asarray(motion.skeleton.offsets, np.float64)
     thigh, shin = world[:, leg.hip] @ offsets[leg.knee], world[:, leg.knee] @ offsets[leg.ankle]
-    axis = np.einsum("tij,j->ti", world[:, leg.hip], _bend_axis(motion, world, leg, thigh, shin))
+    if bend_axis is None:
+        bend_axis = _bend_axis(motion, world, leg, thigh, shin)
+    axis = np.einsum("tij,j->ti", world[:, leg.hip], bend_axis)
     distance = np.linalg.norm(target - hip, axis=-1)
     upper, lower = _bones(motion, leg)
     distance = np.clip(distance, abs(upper - lower) + 1e-4, _REACH * (upper + lower))

@@ -199,6 +199,7 @@ class Model(NamedTuple):
     proceed: Callable[..., tuple[Array, Any]] | None = None
     """``proceed(params, summary, key, condition, start, state) -> (pose (T, R, D), state)``: the next T frames.
 
+    ``start`` is any frame, so that motion can be generated a few frames at a time.
     Every array of such a model's condition has time as its leading axis, ``T + overlap`` frames. ``sample`` is
     ``proceed`` after ``begin``.
     """

@@ -19,15 +19,16 @@ def frame_normal(
     The same frame gets the same values in every window, because each block of 128 frames has a key of its own.
 
     Args:
-        start: a multiple of 128; may be negative.
+        start: may be negative.
         frames: any number.
     """
-    blocks = -(-frames // BLOCK)
+    # One block more than the frames fill, since a window may begin within one.
+    blocks = -(-frames // BLOCK) + 1
     numbers = start // BLOCK + jnp.arange(blocks)
     # Block numbers may be negative (context before the first frame); as unsigned they are still distinct.
     keys = jax.vmap(lambda n: jax.random.fold_in(key, n.astype(jnp.uint32)))(numbers)
     noise = jax.vmap(lambda k: jax.random.normal(k, (BLOCK, channels)))(keys)
-    return noise.reshape(blocks * BLOCK, channels)[:frames]
+    return jax.lax.dynamic_slice_in_dim(noise.reshape(blocks * BLOCK, channels), start % BLOCK, frames)
 
 
 def blended_draws(key: Key[Array, ""], table: Tree, start: Int[Array, ""], frames: int, period: int) -> Tree:

@@ -31,6 +31,11 @@ class TestFrameNormal:
             first = (block + 2) * BLOCK
             np.testing.assert_array_equal(part, long[first : first + frames])
 
+    def test_a_window_may_begin_within_a_block(self):
+        long = np.asarray(normal(start_at(-BLOCK), 4 * BLOCK, 3))
+        for start, frames in ((-127, 9), (-1, 3), (5, 7), (100, 60), (127, 130)):
+            np.testing.assert_array_equal(normal(start_at(start), frames, 3), long[start + BLOCK :][:frames])
+
     def test_no_two_blocks_are_alike(self):
         blocks = np.asarray(normal(start_at(-2 * BLOCK), 5 * BLOCK, 3)).reshape(5, -1)
         correlation = np.corrcoef(blocks) - np.eye(5)

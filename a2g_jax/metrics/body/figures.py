@@ -145,7 +145,7 @@ class Reference:
         }
         found["range"][:, 0] = 0.0
         if self.hinges:
-            found |= self._hinges(rotations)
+            found |= self.hinge_figures(rotations)
         places = motion.positions() if self.wrists or self.feet else None
         if places is not None and self.wrists:
             wrists = places[:, [self.joints[role] for role in self.wrists]] - root[:, None]
@@ -157,7 +157,8 @@ class Reference:
             found |= self._feet(places[:, self.feet], motion.fps)
         return found
 
-    def _hinges(self, rotations: Float[np.ndarray, "T J 3 3"]) -> dict[str, Float[np.ndarray, "T hinges"]]:
+    def hinge_figures(self, rotations: Float[np.ndarray, "T J 3 3"]) -> dict[str, Float[np.ndarray, "T hinges"]]:
+        """``bend``, ``backwards`` and ``sideways`` of :meth:`figures`, of local rotations."""
         flexion, sideways = np.zeros((2, len(rotations), len(self.hinges)), rotations.dtype)
         for number, (hinge, axis) in enumerate(zip(self.hinges, self.axes, strict=True)):
             bones = self._bones(number)

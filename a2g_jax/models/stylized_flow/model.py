@@ -223,7 +223,7 @@ def build(config: StylizedFlowConfig, data: Data, sampling: StylizedFlowSampling
 def draw_latents(
     temperature: float, freedom: float, key: Key[Array, ""], start: Int[Array, ""], frames: int, channels: int
 ) -> Float[Array, "T C"]:
-    """Latents of the frames from ``start``, a multiple of 128: each a function of the key and its number."""
+    """Latents of the frames from ``start``: each a function of the key and its number."""
     normal_key, divisor_key = jax.random.split(key)
     normal = frame_normal(normal_key, start, frames, channels)
 

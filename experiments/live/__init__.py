@@ -1,0 +1,1 @@
+"""Live generation measured."""
