@@ -292,6 +292,7 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     assert json.loads((tmp_path / "run" / "run.json").read_text())["steps"] == 10
 
 
+@pytest.mark.slow
 def test_any_rig_trains_as_it_is(capsys, tmp_path):
     """All joints of a rig that is no body, at a rate that is no whole number."""
     names = ("tail", "fin", "eye")

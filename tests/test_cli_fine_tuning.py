@@ -35,6 +35,7 @@ def takes(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_two_people_are_prepared_for_a_run_and_tuned_together(tmp_path, source, takes, capsys):
     assert main(["prepare", "folder", str(takes), "--out", str(tmp_path / "c"), "--for", str(source)]) == 0
     corpus, theirs = Corpus.open(tmp_path / "c"), load_run(source).config

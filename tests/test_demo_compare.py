@@ -50,6 +50,7 @@ def test_compare_shows_every_system_and_the_talker(tmp_path):
     assert "no true talker" in (out / "index.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_runs_of_ones_own_are_compared_too(tmp_path, toy_run_config, toy_corpus, capsys):
     train(toy_run_config(steps=2), toy_corpus, tmp_path / "mine", resume=False, progress=False)
     found = comparison.systems([str(tmp_path / "mine"), "demo"])

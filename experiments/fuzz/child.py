@@ -28,17 +28,18 @@ class Outcome(NamedTuple):
     seconds: float
     """Of the processor."""
     megabytes: float
-    """Largest memory of the process, with the program itself."""
+    """Largest memory of the process, without what the program has before."""
     message: str
 
 
 def read_apart(read: Callable[[Path], Any], path: Path) -> Outcome:
     """Read a file in a fork of this process."""
     receive, send = os.pipe()
+    size, resident = _memory()
     child = os.fork()
     if child == 0:
         os.close(receive)
-        _limit()
+        _limit(size)
         text = _attempt(read, path)
         with os.fdopen(send, "wb") as pipe:
             pipe.write(text.encode("utf-8", "replace")[:4000])
@@ -50,15 +51,22 @@ def read_apart(read: Callable[[Path], Any], path: Path) -> Outcome:
     kind, _, message = text.partition("\n")
     if not kind:
         kind, message = CRASH, f"ended by signal {os.WTERMSIG(status)}" if os.WIFSIGNALED(status) else "ended"
-    seconds, megabytes = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    seconds, megabytes = usage.ru_utime + usage.ru_stime, max(0.0, usage.ru_maxrss / 1024 - resident / 1e6)
     if kind in (READ, REFUSED, UNNAMED) or "signal 24" in message or "MemoryError" in message:
         kind = SLOW if seconds > SECONDS else LARGE if megabytes * 1e6 > MEMORY or "MemoryError" in message else kind
     return Outcome(kind, seconds, megabytes, message)
 
 
-def _limit() -> None:
+def _memory() -> tuple[int, int]:
+    """Address space and resident memory of this process, bytes, of which a fork has the same."""
+    size, resident = Path("/proc/self/statm").read_text().split()[:2]
+    page = os.sysconf("SC_PAGE_SIZE")
+    return int(size) * page, int(resident) * page
+
+
+def _limit(before: int) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (_STOP_SECONDS, _STOP_SECONDS + 1))
-    resource.setrlimit(resource.RLIMIT_AS, (_STOP_MEMORY, _STOP_MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (before + _STOP_MEMORY,) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     signal.signal(signal.SIGXCPU, signal.SIG_DFL)
     quiet = os.open(os.devnull, os.O_WRONLY)

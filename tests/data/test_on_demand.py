@@ -108,6 +108,7 @@ def whole(corpus, config, tmp_path_factory):
     return train(config(), corpus, path, resume=False, progress=False), path
 
 
+@pytest.mark.slow
 def test_resuming_equals_not_having_stopped(tmp_path, corpus, config, whole, monkeypatch):
     whole, path = whole
     original = loop.MetricsLog.tick

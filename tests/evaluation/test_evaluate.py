@@ -454,7 +454,8 @@ def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys)
         load_emotion_judge(tmp_path / "audio-classifier", corpus)
 
 
-@pytest.mark.parametrize("view", [pytest.param("s2g", marks=pytest.mark.slow), "ted"])
+@pytest.mark.slow
+@pytest.mark.parametrize("view", ["s2g", "ted"])
 def test_poses_without_a_skeleton_are_scored(view, tmp_path, monkeypatch):
     """Keypoints in their own unit, bones in metres; a model's samples too."""
     out = tmp_path / "corpus"

@@ -37,6 +37,7 @@ def network(frames):
     return SimpleNamespace(clip_frames=frames, clip_features=clip_features)
 
 
+@pytest.mark.slow
 def test_every_table_has_the_rows_that_its_scores_are_read_against(corpus):
     rows = nulls(Ruler(corpus, network(10), 3, UNITS["stylized-flow"]), PROTOCOL)
     names = ["truth", "another right motion", "another clip's motion", "first pose held", "mean pose", HALVES]

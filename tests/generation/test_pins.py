@@ -307,7 +307,7 @@ def test_from_the_command_line(take, speech, tmp_path, capsys):
     rows = json.loads((out / "pins.json").read_text())
     assert [[row["followed"] for row in sample] for sample in rows] == [[True], [True]]
     page = (out / "index.html").read_text()
-    assert "training steps, seed 0; energy=0.9; edit specific scale 0:10 1.1; pinned wave.bvh at 3 s</p>" in page
+    assert "; energy=0.9; edit specific scale 0:10 1.1; pinned wave.bvh at 3 s</p>" in page
     assert main([*command, "--pin", clip, "--pin-shared", "1"]) == 2
     assert "--pin-shared is for --pin-mode latent" in capsys.readouterr().err
     assert main([*command, "--pin", f"{tmp_path / 'wave.bvh'}@7"]) == 2

@@ -126,11 +126,11 @@ def test_changed_sampling_settings_survive_a_resume(toy_run, toy_corpus, tmp_pat
     folder = tmp_path / "run"
     shutil.copytree(toy_run, folder)
     values = json.loads((folder / "run.json").read_text())
-    values["sampling"]["scale"] = 0.25
+    values["sampling"]["amplitude"] = 0.25
     values["checksum"] = None  # accepts the edit
     (folder / "run.json").write_text(json.dumps(values))
     assert main(["train", MODEL, "--corpus", str(toy_corpus.path), "--out", str(folder), "--resume"]) == 0
-    assert json.loads((folder / "run.json").read_text())["sampling"] == {"scale": 0.25}
+    assert json.loads((folder / "run.json").read_text())["sampling"] == {"amplitude": 0.25}
 
 
 def test_impossible_stages_are_named(toy_corpus):
@@ -154,11 +154,11 @@ def test_the_commands_take_it(toy_run, toy_corpus, tmp_path, capsys):
     write_audio(speech, np.sin(np.arange(16000) / 20.0).astype(np.float32) * 0.1, 16000)
     out = tmp_path / "out"
     arguments = ["generate", str(toy_run), "--audio", str(speech), "--out", str(out), "--samples", "2"]
-    assert main([*arguments, "--formats", "npz", "--scale", "0.5"]) == 0
+    assert main([*arguments, "--formats", "npz", "--amplitude", "0.5"]) == 0
     assert sorted(path.name for path in out.iterdir()) == ["checks.json", "sample_00.npz", "sample_01.npz"]
     capsys.readouterr()
     assert main(["generate", str(toy_run), "--settings"]) == 0
-    assert "--scale 1.0" in capsys.readouterr().out
+    assert "--amplitude 1.0" in capsys.readouterr().out
     assert main([*arguments, "--temperature", "2"]) == 2
     assert "no setting --temperature" in capsys.readouterr().err
     report = tmp_path / "report"

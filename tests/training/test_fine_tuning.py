@@ -79,7 +79,7 @@ def test_a_tuned_run_starts_from_the_weights_and_records_the_source(tmp_path, so
     assert len(run.summary["specific_mean"]) > 2 * len(load_run(source).summary["specific_mean"])
 
 
-@pytest.mark.smoke
+@pytest.mark.slow
 def test_resuming_a_tuned_run_is_exact(tmp_path, tuned, toy_corpus, monkeypatch):
     config, params = tuned(patience=2, learning_rate=1e-3)
     whole = train(config, toy_corpus, tmp_path / "whole", resume=False, progress=False, start=params)

@@ -263,6 +263,7 @@ def test_a_corpus_that_changes_under_a_training_is_one_error(toy_corpus, trained
         train(trained[1], Corpus.open(corpus), tmp_path / "run", resume=False, progress=False)
 
 
+@pytest.mark.slow
 def test_a_full_disk_while_training(toy_corpus, trained, tmp_path):
     """At the log, the weights or a checkpoint: one line, and after it the training resumes to the same end."""
     config = trained[1]

@@ -21,7 +21,7 @@ class ToyConfig:
 class ToySampling:
     """Settings of generation."""
 
-    scale: float = 1.0
+    amplitude: float = 1.0
     """Scale of the drawn noise."""
 
 

@@ -92,7 +92,10 @@ def build(config, data, sampling):
 
         def one(before, now):
             hidden_now, drawn = now
-            x = frame(params, hidden_now, before) + 0.1 * sampling.scale * jnp.exp(params["spread"]["log_std"]) * drawn
+            x = (
+                frame(params, hidden_now, before)
+                + 0.1 * sampling.amplitude * jnp.exp(params["spread"]["log_std"]) * drawn
+            )
             return 0.9 * x, x
 
         state, x = jax.lax.scan(one, state, (given, noise))
