@@ -35,12 +35,12 @@ class Outcome(NamedTuple):
 def read_apart(read: Callable[[Path], Any], path: Path) -> Outcome:
     """Read a file in a fork of this process."""
     receive, send = os.pipe()
-    size, resident = _memory()
     child = os.fork()
     if child == 0:
         os.close(receive)
+        size, resident = _memory()
         _limit(size)
-        text = _attempt(read, path)
+        text = f"{resident}\n{_attempt(read, path)}"
         with os.fdopen(send, "wb") as pipe:
             pipe.write(text.encode("utf-8", "replace")[:4000])
         os._exit(0)
@@ -48,10 +48,11 @@ def read_apart(read: Callable[[Path], Any], path: Path) -> Outcome:
     with os.fdopen(receive, "rb") as pipe:
         text = pipe.read().decode("utf-8", "replace")
     _, status, usage = os.wait4(child, 0)
+    resident, _, text = text.partition("\n")
     kind, _, message = text.partition("\n")
     if not kind:
         kind, message = CRASH, f"ended by signal {os.WTERMSIG(status)}" if os.WIFSIGNALED(status) else "ended"
-    seconds, megabytes = usage.ru_utime + usage.ru_stime, max(0.0, usage.ru_maxrss / 1024 - resident / 1e6)
+    seconds, megabytes = usage.ru_utime + usage.ru_stime, max(0.0, usage.ru_maxrss * 1024 - int(resident or 0)) / 1e6
     if kind in (READ, REFUSED, UNNAMED) or "signal 24" in message or "MemoryError" in message:
         kind = SLOW if seconds > SECONDS else LARGE if megabytes * 1e6 > MEMORY or "MemoryError" in message else kind
     return Outcome(kind, seconds, megabytes, message)
