@@ -38,6 +38,7 @@ def folds_of(folder, take, change=None):
     return prepare_folds("take", folder / "take.bvh", demo_run().config, folder / "cache")
 
 
+@pytest.mark.slow
 def test_nothing_of_a_held_out_part_enters_the_others(tmp_path, take):
     """Another motion and louder speech in one part change no number of the corpus without it."""
     first, last = bounds(take.motion.frames, 2)

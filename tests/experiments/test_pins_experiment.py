@@ -23,6 +23,7 @@ def figures():
     return {"seed": 1, "jerk_limit": 800.0, "runs": {"demo": {"sources": {"generated talk": rows}, "absurd": absurd}}}
 
 
+@pytest.mark.slow
 def test_absurd_clips_never_break_the_body(figures):
     rows = {row["case"]: row for row in figures["runs"]["demo"]["absurd"]}
     for row in rows.values():

@@ -303,6 +303,7 @@ def test_gestures_and_transcripts_follow(tmp_path):
 # Corpora
 
 
+@pytest.mark.slow
 def test_a_corpus_of_both_kinds_of_voices(tmp_path, monkeypatch):
     needs_voices()
     monkeypatch.setattr(recordings, "RECORDING_SECONDS", 4.0)

@@ -219,6 +219,7 @@ def test_validation_is_held_out_where_the_split_is_too_short(toy_corpus, frames,
     assert with_validation(toy_corpus, 16) == (toy_corpus, "")
 
 
+@pytest.mark.slow
 def test_two_people_together(tmp_path, source, tuned, toy_corpus):
     """Recordings of several people are one corpus; each gives validation clips of its own."""
     two = dataclasses.replace(toy_corpus, splits={"train": [Segment(0, 0, 300), Segment(1, 0, 200)], "validation": []})
