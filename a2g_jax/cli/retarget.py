@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--fingers",
-        choices=("rest", "relaxed"),
-        default="rest",
-        help="fingers of the target that the source does not move: as in its rest pose (default), or relaxed",
+        choices=("relaxed", "none"),
+        default="none",
+        help="fingers of the target that the source does not move: none, as in its rest pose (default), or relaxed",
     )
     parser.add_argument("--mirror", action="store_true", help="exchange left and right")
     parser.add_argument(

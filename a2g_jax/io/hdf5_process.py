@@ -24,7 +24,7 @@ from a2g_jax.io.untrusted.budget import Limits
 _SECONDS = 60.0
 #: Memory beyond that of the arrays: Python, NumPy and the library.
 _PROGRAM = 3 * 2**30
-_START = "import sys; sys.path[:] = eval(sys.argv[1]); from a2g_jax.io.hdf5_process import serve; serve()"
+_START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from a2g_jax.io.hdf5_process import serve; serve()"
 
 _lock = threading.Lock()
 _running: dict[int, subprocess.Popen[bytes]] = {}
@@ -84,7 +84,7 @@ def _process() -> "subprocess.Popen[bytes]":
     process = _running.get(os.getpid())
     if process is None or process.poll() is not None:
         _running.clear()
-        command = [sys.executable, "-c", _START, repr(sys.path)]
+        command = [sys.executable, "-c", _START, json.dumps(sys.path)]
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=-1
         )
