@@ -128,6 +128,7 @@ def test_resuming_equals_not_having_stopped(tmp_path, corpus, config, whole, mon
     assert (tmp_path / "half" / "metrics.jsonl").read_text() == (path / "metrics.jsonl").read_text()
 
 
+@pytest.mark.slow
 def test_the_parts_matter(tmp_path, corpus, config, whole):
     """Training on the stored part alone ends elsewhere."""
     whole, path = whole

@@ -44,6 +44,7 @@ def test_absurd_clips_never_break_the_body(figures):
     assert rows["half a second"]["outcome"] == "performed"
 
 
+@pytest.mark.slow
 def test_pins_of_the_experiment_are_followed(figures):
     row = figures["runs"]["demo"]["sources"]["generated talk"]
     assert row["followed"]["mean"] == 1.0

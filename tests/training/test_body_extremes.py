@@ -45,6 +45,7 @@ def test_the_minimum_is_a_time(toy_corpus, toy_run_config):
     assert corpus_extremes(replace(short, fps=15.0), config) is not None
 
 
+@pytest.mark.slow
 def test_short_recordings_raise_the_extremes_of_the_source(tmp_path, source, toy_corpus):
     """With what is held out for early stopping: the run's bounds are not those of any person."""
     short = replace(toy_corpus, splits={"train": [Segment(0, 0, 300)]})

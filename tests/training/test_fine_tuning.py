@@ -111,6 +111,7 @@ def test_resuming_a_tuned_run_is_exact(tmp_path, tuned, toy_corpus, monkeypatch)
         train(plain, toy_corpus, half, resume=True, progress=False)
 
 
+@pytest.mark.slow
 def test_early_stopping_keeps_the_best_weights(tmp_path, tuned, toy_corpus, monkeypatch):
     losses = iter([3.0, 2.0, 2.5, float("nan"), 2.2, 1.0, 1.0])
     monkeypatch.setattr(loop.Validator, "__call__", lambda *_: {"loss": next(losses)})

@@ -113,6 +113,7 @@ def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config)
     assert figures["mean_pose_cm"] == pytest.approx(np.mean(single), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_run_that_never_got_to_a_checkpoint_can_be_started_again(tmp_path, toy_corpus, toy_run_config):
     out = tmp_path / "run"
     with pytest.raises(TrainingError):
@@ -254,6 +255,7 @@ def test_killed_at_any_moment_training_ends_the_same(tmp_path, toy_corpus, toy_r
     assert equal_trees(load_run(tmp_path / "whole").params, load_run(tmp_path / "killed").params)
 
 
+@pytest.mark.slow
 def test_a_checkpoint_of_version_0_1_resumes(tmp_path, toy_corpus, toy_run_config):
     """It held the state of one optimiser under another name."""
     from orbax.checkpoint import v1 as ocp
