@@ -10,6 +10,8 @@ from a2g_jax.generation.emotion_gesture.emotion_space import EmotionSpace as Emo
 from a2g_jax.generation.export import export as export
 from a2g_jax.generation.generator import Generator as Generator
 from a2g_jax.generation.live.stream import Stream as Stream
+from a2g_jax.generation.programs.loaded import Programs as Programs
+from a2g_jax.generation.programs.writing import export_programs as export_programs
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style as Style
 from a2g_jax.geometry.motion import Motion as Motion

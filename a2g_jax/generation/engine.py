@@ -49,28 +49,32 @@ class Engine:
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)
-        space, draw, begin, proceed = run.config.space, model.sample, model.begin, model.proceed
         #: Requests of the sampling settings.
         self.lines: Sequence[str] = getattr(run.config.sampling_settings, "controls", ())
         if model.controls is not None and self.lines:
             check_stored(run, model.controls)
+        self._sample, self._advance = jax.jit(self.sample), jax.jit(self.advance)
+        self._begin = None if model.begin is None else jax.jit(self.begin)
 
-        @jax.jit
-        def sample(params, summary, key, condition, start):
-            pose = draw(params, summary, key, condition, start)
-            return space.valid(jax.lax.dynamic_slice_in_dim(pose, self.halo, window))
+    def sample(self, params, summary, key, condition, start) -> Any:
+        """Poses (window, R, D) of a window of a model that is not autoregressive."""
+        assert self.model.sample is not None
+        pose = self.model.sample(params, summary, key, condition, start)
+        return self.run.config.space.valid(jax.lax.dynamic_slice_in_dim(pose, self.halo, self.window))
 
-        @jax.jit
-        def advance(params, summary, keys, condition, start, state):
-            assert proceed is not None
-            rows = window + model.overlap
-            cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self.halo, rows), condition)
-            lanes = jax.vmap(proceed, in_axes=(None, None, 0, None, None, 0))
-            pose, state = lanes(params, summary, keys, cut, start + self.halo, state)
-            return space.valid(pose), state
+    def begin(self, params, summary, keys, seed_poses) -> Any:
+        """States of an autoregressive model before the first frame, one for each of :data:`LANES` keys."""
+        assert self.model.begin is not None
+        return jax.vmap(self.model.begin, in_axes=(None, None, 0, None))(params, summary, keys, seed_poses)
 
-        self._sample, self._advance = sample, advance
-        self._begin = None if begin is None else jax.jit(jax.vmap(begin, in_axes=(None, None, 0, None)))
+    def advance(self, params, summary, keys, condition, start, state) -> tuple[Any, Any]:
+        """Poses (lanes, window, R, D) of a window of an autoregressive model, and the states after it."""
+        assert self.model.proceed is not None
+        rows = self.window + self.model.overlap
+        cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self.halo, rows), condition)
+        lanes = jax.vmap(self.model.proceed, in_axes=(None, None, 0, None, None, 0))
+        pose, state = lanes(params, summary, keys, cut, start + self.halo, state)
+        return self.run.config.space.valid(pose), state
 
     def rows(self, given: Condition, samples: int, seed: int = 0) -> Iterator[Rows]:
         """Different motions in the run's pose space, one after another.
@@ -139,6 +143,11 @@ class Engine:
             yield from map(self.run.finished, np.concatenate(parts, axis=1)[: samples - first, :frames])
 
     def _windows(self, given: Condition) -> Iterator[tuple[int, Any]]:
+        """First frame (context included) of each window, and what the model makes of its condition."""
+        for start, cut in self.cuts(given):
+            yield start, self._condition(self._params, self._summary, cut)
+
+    def cuts(self, given: Condition) -> Iterator[tuple[int, Condition]]:
         """First frame (context included) and condition of each window."""
         frames, halo, window = len(given.audio), self.halo, self.window
         count = -(-frames // window)
@@ -161,7 +170,7 @@ class Engine:
                 style=given.style,
                 **jax.tree.map(lambda array, rows=rows: array[rows], held),
             )
-            yield start - halo, self._condition(self._params, self._summary, cut)
+            yield start - halo, cut
 
     def _controls(self, given: Condition) -> Any:
         """Requested controls, frame by frame; None where there are none and the model needs none."""

@@ -11,8 +11,7 @@ from a2g_jax.features.mel import log_mel
 from a2g_jax.features.offset import without_offset
 from a2g_jax.features.samples import mono_samples
 from a2g_jax.generation.engine import WINDOW, Engine, Rows
-from a2g_jax.geometry.footholds import lock_feet
-from a2g_jax.geometry.ground import plant_feet
+from a2g_jax.generation.planting import planted
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.io.audio import resampled
@@ -185,6 +184,5 @@ def plant_rotations(run: Run, rotations: Float[np.ndarray, "T J 3 3"]) -> Motion
     """The motion of local rotations, with a root that plants the feet as in the run's mean pose, and legs that keep
     standing feet where they are."""
     config = run.config
-    still = Motion(rotations, np.zeros((len(rotations), 3), np.float32), config.skeleton, config.fps)
     mean_pose = config.space.mean_rotations(config.statistics["pose"].mean)
-    return lock_feet(plant_feet(still, np.asarray(config.statistics["root"].mean), mean_pose))
+    return planted(rotations, config.skeleton, config.fps, config.statistics["root"].mean, mean_pose)

@@ -1,0 +1,1 @@
+"""Generators as StableHLO programs with weights, which run without the code of their models."""
