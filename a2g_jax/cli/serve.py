@@ -1,0 +1,118 @@
+"""``a2g serve``: live motion over a WebSocket, and a page with a microphone."""
+
+import argparse
+from dataclasses import replace
+
+from a2g_jax.cli import sampling
+from a2g_jax.cli.argument_types import number
+from a2g_jax.cli.paths import existing_file, existing_run
+from a2g_jax.errors import InputError
+from a2g_jax.io.character import character_suffix
+from a2g_jax.serving.run import check_extra, exposure, listen, serve
+
+DESCRIPTION = (
+    "Serve live motion on this computer: a page with a microphone, and a WebSocket that takes audio and gives frames"
+    " (docs/live.md). Every setting of the model's generation is a flag too, such as --temperature."
+)
+#: Further flags are settings.
+TAKES_SETTINGS = True
+#: The run, the port and the look-ahead where nothing else is named.
+RUN, PORT, LOOKAHEAD = "demo", 8765, 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Flags of ``a2g serve``; those of settings are read later, since they depend on the run."""
+    parser.add_argument(
+        "run", nargs="?", default=RUN, metavar="RUN", help=f"a run folder or the name of a shipped run (default: {RUN})"
+    )
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this computer)")
+    parser.add_argument(
+        "--port", type=number(int, 0, 65535, "a port"), default=PORT, help=f"default: {PORT}; 0 for one that is free"
+    )
+    parser.add_argument(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="another name of this computer in the address bar, such as that of a proxy; may be repeated",
+    )
+    parser.add_argument(
+        "--lookahead",
+        type=number(float, 0, 60, "seconds of speech that frames wait for"),
+        default=LOOKAHEAD,
+        metavar="S",
+        help=f"seconds of speech that frames wait for, unless a client names others (default: {LOOKAHEAD})",
+    )
+    parser.add_argument(
+        "--clients",
+        type=number(int, 1, 1000, "clients at a time"),
+        default=8,
+        metavar="N",
+        help="at a time (default: 8)",
+    )
+    parser.add_argument(
+        "--idle",
+        type=number(float, 1, 86400, "seconds"),
+        default=30.0,
+        metavar="S",
+        help="seconds of a silent connection before it is closed (default: 30)",
+    )
+    parser.add_argument(
+        "--pace",
+        type=number(float, 1, 1000, "times real time"),
+        default=4.0,
+        metavar="X",
+        help="times real time at which audio is read from a client (default: 4)",
+    )
+    parser.add_argument("--to", metavar="CHARACTER", help="a BVH, GLB or VRM file whose joints the frames move")
+    parser.add_argument(
+        "--fingers", choices=("relaxed", "none"), help="fingers of the character that the run does not move"
+    )
+
+
+def run(options: argparse.Namespace, extra: list[str]) -> None:
+    """Load, compile, and answer until Ctrl-C.
+
+    Raises:
+        InputError: a run, a character or a port that cannot be used, or missing packages.
+    """
+    check_extra("a2g serve")
+    existing_run(options.run)
+    settings = sampling.sampling_settings(options.run, extra)
+    if options.to is not None:
+        character_suffix(options.to)
+        existing_file(options.to)
+    elif options.fingers is not None:
+        raise InputError("--fingers is for the fingers of a character; name it with --to.")
+    bound = listen(options.host, options.port)
+    try:
+        if (warning := exposure(options.host)) is not None:
+            print(warning)
+        app = _application(options, settings)
+    except BaseException:
+        bound.close()
+        raise
+    serve(app, bound, lambda line: print(line, flush=True))
+
+
+def _application(options: argparse.Namespace, settings: object) -> object:
+    from a2g_jax.compilations import keep_compilations
+    from a2g_jax.generation.delivery import Delivery
+    from a2g_jax.io.character import read_character
+    from a2g_jax.serving.app import make_app
+    from a2g_jax.serving.live.page import lifespan, routes
+    from a2g_jax.serving.live.service import Limits, Service
+    from a2g_jax.serving.security import Security
+    from a2g_jax.training.run import open_run
+
+    keep_compilations()
+    opened = open_run(options.run)
+    trained = replace(opened, config=replace(opened.config, sampling=settings))
+    character = None if options.to is None else read_character(options.to)
+    delivery = Delivery(character=character, fingers=options.fingers != "none")
+    limits = Limits(clients=options.clients, idle=options.idle, pace=options.pace)
+    service = Service(trained, limits, options.lookahead, delivery)
+    print("compiling; a minute the first time, seconds later", flush=True)
+    service.warm_up()
+    security = Security(options.host, tuple(options.allow_host))
+    return make_app(routes(service, options.run), security, lifespan(service))
