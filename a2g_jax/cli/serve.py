@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 
 from a2g_jax.cli import sampling
-from a2g_jax.cli.argument_types import number
+from a2g_jax.cli.argument_types import count, number
 from a2g_jax.cli.paths import existing_file, existing_run
 from a2g_jax.errors import InputError
 from a2g_jax.io.character import character_suffix
@@ -27,7 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this computer)")
     parser.add_argument(
-        "--port", type=number(int, 0, 65535, "a port"), default=PORT, help=f"default: {PORT}; 0 for one that is free"
+        "--port",
+        type=number(int, 0, 65535, "a number from 0 to 65535"),
+        default=PORT,
+        help=f"default: {PORT}; 0 for one that is free",
     )
     parser.add_argument(
         "--allow-host",
@@ -38,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--lookahead",
-        type=number(float, 0, 60, "seconds of speech that frames wait for"),
+        type=number(float, 0, 60, "0 to 60 seconds"),
         default=LOOKAHEAD,
         metavar="S",
         help=f"seconds of speech that frames wait for, unless a client names others (default: {LOOKAHEAD})",
@@ -52,14 +55,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--idle",
-        type=number(float, 1, 86400, "seconds"),
+        type=number(float, 1, 86400, "1 to 86400 seconds"),
         default=30.0,
         metavar="S",
         help="seconds of a silent connection before it is closed (default: 30)",
     )
     parser.add_argument(
         "--pace",
-        type=number(float, 1, 1000, "times real time"),
+        type=number(float, 1, 1000, "a number from 1 to 1000"),
         default=4.0,
         metavar="X",
         help="times real time at which audio is read from a client (default: 4)",

@@ -1,4 +1,4 @@
-"""A client of ``a2g serve``: ``python -m a2g_jax.serving.client speech.wav ws://127.0.0.1:8765/live [--out motion.npz]``.
+"""A client of ``a2g serve``: ``python -m a2g_jax.serving.client speech.wav ws://127.0.0.1:8765/live``.
 
 Sends a sound file as a microphone would, in pieces of 20 ms and in real time, and prints how far behind the frames are.
 """

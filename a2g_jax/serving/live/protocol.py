@@ -32,7 +32,7 @@ _REASON = 123
 _HEADER = np.dtype("<u4")
 
 
-class Refusal(Exception):  # noqa: N818 - no error of the server
+class Refusal(Exception):
     """A client's message that ends its connection."""
 
     def __init__(self, code: int, reason: str) -> None:

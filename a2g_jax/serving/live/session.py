@@ -53,7 +53,7 @@ async def live(websocket: WebSocket, service: Service) -> None:
         await _end(websocket, refusal)
     except (WebSocketDisconnect, OSError):
         pass
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - one client's fault must not be everybody's
         # The client gets no details; a server in a terminal shows them.
         _LOG.exception("live: unexpected %s", type(error).__name__)
         await _end(websocket, Refusal(BROKEN, f"unexpected {type(error).__name__} on the server."))
