@@ -26,12 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "run", nargs="?", default=RUN, metavar="RUN", help=f"a run folder or the name of a shipped run (default: {RUN})"
     )
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this computer)")
-    parser.add_argument(
-        "--port",
-        type=number(int, 0, 65535, "a number from 0 to 65535"),
-        default=PORT,
-        help=f"default: {PORT}; 0 for one that is free",
-    )
+    port = number(int, 0, 65535, "a number from 0 to 65535")
+    parser.add_argument("--port", type=port, default=PORT, help=f"default: {PORT}; 0 for one that is free")
     parser.add_argument(
         "--allow-host",
         action="append",
@@ -47,11 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"seconds of speech that frames wait for, unless a client names others (default: {LOOKAHEAD})",
     )
     parser.add_argument(
-        "--clients",
-        type=number(int, 1, 1000, "clients at a time"),
-        default=8,
-        metavar="N",
-        help="at a time (default: 8)",
+        "--clients", type=count, default=8, metavar="N", help="at a time, further ones are refused (default: 8)"
     )
     parser.add_argument(
         "--idle",

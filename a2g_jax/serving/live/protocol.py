@@ -81,21 +81,23 @@ def parse_hello(text: str) -> Hello:
             raise Refusal(MALFORMED, f"hello: unknown field {name[:40]!r}; it may have {', '.join(known)}.")
     if "sample_rate" not in given:
         raise Refusal(MALFORMED, "hello: sample_rate is missing, the samples per second, such as 48000.")
-    hello = Hello(**given)
-    _check(type(hello.sample_rate) in (int, float), "sample_rate", "a number", hello.sample_rate)
+    rate, ahead = given["sample_rate"], given.get("lookahead")
+    _check(type(rate) in (int, float), "sample_rate", "a number", rate)
     try:
-        rate = check_rate(hello.sample_rate)
+        rate = check_rate(rate)
     except InputError as error:
         raise Refusal(MALFORMED, f"hello: {error}") from None
-    _check(hello.encoding in tuple(ENCODINGS), "encoding", " or ".join(ENCODINGS), hello.encoding)
-    _check(type(hello.channels) is int and hello.channels == 1, "channels", "1; average yours", hello.channels)
-    _check(hello.reply in REPLIES, "reply", " or ".join(REPLIES), hello.reply)
-    _check(type(hello.seed) is int and 0 <= hello.seed < 2**32, "seed", f"0 to {2**32 - 1}", hello.seed)
-    ahead = hello.lookahead
+    encoding, channels = given.get("encoding", "s16le"), given.get("channels", 1)
+    _check(isinstance(encoding, str) and encoding in ENCODINGS, "encoding", " or ".join(ENCODINGS), encoding)
+    _check(type(channels) is int and channels == 1, "channels", "1; average yours", channels)
+    reply, seed = given.get("reply", "json"), given.get("seed", 0)
+    _check(isinstance(reply, str) and reply in REPLIES, "reply", " or ".join(REPLIES), reply)
+    _check(type(seed) is int and 0 <= seed < 2**32, "seed", f"0 to {2**32 - 1}", seed)
     valid = ahead is None or (type(ahead) in (int, float) and 0 <= ahead <= 60)
     _check(valid, "lookahead", "0 to 60 seconds, or null", ahead)
-    _check(isinstance(hello.sampling, dict), "sampling", "an object of settings", hello.sampling)
-    return Hello(rate, *[getattr(hello, name) for name in known[1:]])
+    sampling = given.get("sampling", {})
+    _check(isinstance(sampling, dict), "sampling", "an object of settings", sampling)
+    return Hello(rate, encoding, 1, reply, seed, None if ahead is None else float(ahead), sampling)
 
 
 def parse_object(text: str, what: str) -> dict[str, Any]:
@@ -178,7 +180,9 @@ def frames_json(motion: Motion, first: int) -> str:
 
 def frames_binary(motion: Motion, first: int) -> bytes:
     """Frames as a binary message: the header, then for each frame root and rotations, float32, little-endian."""
-    rows = np.concatenate([np.asarray(motion.root), quaternions(motion).reshape(motion.frames, -1)], axis=1)
+    rows = np.concatenate(
+        [np.asarray(motion.root), quaternions(motion).reshape(motion.frames, 4 * motion.skeleton.joints)], axis=1
+    )
     return with_header(rows, first)
 
 
@@ -206,7 +210,7 @@ def _typed(name: str, value: Any, default: Any) -> Any:
     kinds: tuple[type, ...] = {bool: (bool,), str: (str,), float: (int, float)}.get(type(default), (int,))
     if type(value) not in kinds or (isinstance(value, float) and not math.isfinite(value)):
         raise Refusal(MALFORMED, f"sampling: {name}: expected {' or '.join(kind.__name__ for kind in kinds)}.")
-    return value
+    return float(value) if isinstance(default, float) else value
 
 
 def _no_constant(name: str) -> None:

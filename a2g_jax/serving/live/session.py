@@ -59,14 +59,34 @@ async def live(websocket: WebSocket, service: Service) -> None:
         await _end(websocket, Refusal(BROKEN, f"unexpected {type(error).__name__} on the server."))
 
 
+class Pace:
+    """How fast the audio of a client is read."""
+
+    def __init__(self, pace: float, burst: float) -> None:
+        """
+        Args:
+            pace: times real time.
+            burst: seconds of audio that are read without waiting.
+        """
+        self._pace, self._burst = pace, burst
+        self._start: float | None = None
+        #: Audio so far.
+        self.seconds = 0.0
+
+    def wait(self, seconds: float, now: float) -> float:
+        """Seconds to wait before further audio is taken, at a time."""
+        self._start = now if self._start is None else self._start
+        self.seconds += seconds
+        return max(0.0, (self.seconds - self._burst) / self._pace - (now - self._start))
+
+
 class Session:
     """The stream of one client."""
 
     def __init__(self, websocket: WebSocket, service: Service) -> None:
         self.websocket, self.service, self.limits = websocket, service, service.limits
         self._sent = 0
-        self._started = 0.0
-        self._seconds = 0.0
+        self._pace = Pace(self.limits.pace, self.limits.burst)
 
     async def answer(self) -> None:
         """First message, audio, end.
@@ -81,21 +101,23 @@ class Session:
         stream = await self.service.open(hello)
         encode, ready = await self.service.compute(self._prepare, hello, stream)
         await self._send(ready)
-        self._started = time.monotonic()
         while True:
             message = await self._message()
             if isinstance(message, str):
                 if parse_object(message, "message").get("type") != "end":
                     raise Refusal(MALFORMED, 'text after the first message: expected {"type": "end"}.')
                 await self._give(await self.service.compute(_made, stream.finish, encode, self._sent))
-                await self._send(json.dumps({"type": "end", "frames": self._sent, "seconds": round(self._seconds, 6)}))
+                await self._send(
+                    json.dumps({"type": "end", "frames": self._sent, "seconds": round(self._pace.seconds, 6)})
+                )
                 await self.websocket.close(1000, "end")
                 return
             samples = decode_audio(message, hello.encoding)
             piece = max(1, round(PIECE * hello.sample_rate))
             for start in range(0, len(samples), piece):
                 part = samples[start : start + piece]
-                await self._wait(len(part) / hello.sample_rate)
+                # Nothing is read meanwhile, so that the client waits as well.
+                await asyncio.sleep(self._pace.wait(len(part) / hello.sample_rate, time.monotonic()))
                 await self._give(await self.service.compute(_made, stream.push, encode, self._sent, part))
 
     def _prepare(self, hello: Hello, stream: Stream) -> tuple[Any, str]:
@@ -127,13 +149,6 @@ class Session:
             raise WebSocketDisconnect(event.get("code") or 1005)
         text = event.get("text")
         return text if text is not None else event.get("bytes") or b""
-
-    async def _wait(self, seconds: float) -> None:
-        """Wait until further audio is due: nothing is read meanwhile, so that the client waits as well."""
-        self._seconds += seconds
-        early = (self._seconds - self.limits.burst) / self.limits.pace - (time.monotonic() - self._started)
-        if early > 0:
-            await asyncio.sleep(early)
 
     async def _give(self, made: tuple[int, str | bytes | None]) -> None:
         frames, message = made
