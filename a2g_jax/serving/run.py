@@ -16,6 +16,8 @@ from a2g_jax.serving.security import is_loopback
 _EXTRA = ("starlette", "uvicorn", "websockets", "multipart")
 #: Bytes of a WebSocket's message; connections at a time, of all kinds; seconds that open ones have at the end.
 MESSAGE_LIMIT, CONNECTIONS, SHUTDOWN = 256 * 1024, 128, 3
+#: Bytes of a connection that the system keeps until they are read.
+RECEIVED = 64 * 1024
 
 
 def check_extra(command: str) -> None:
@@ -51,6 +53,8 @@ def listen(host: str = "127.0.0.1", port: int = 0) -> socket.socket:
     bound = socket.socket(family, socket.SOCK_STREAM)
     if sys.platform != "win32":  # there, it would let two servers share a port
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    # Connections inherit it: what has arrived and waits is bounded, and a client that sends too much soon has to wait.
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVED)
     try:
         bound.bind((host, port))
         bound.listen(128)

@@ -1,7 +1,7 @@
 // Microphone -> server -> figure.
 
 const SHOWN_BEHIND = 0.12; // seconds between the newest frame and the one that is shown
-const BACKLOG = 4e6; // bytes that wait to be sent when the connection is too slow
+const BACKLOG = 3; // seconds of audio that wait to be sent when server or connection are too slow
 
 const at = (id) => document.getElementById(id);
 const seconds = (value) => `${value.toFixed(2)} s`;
@@ -72,7 +72,7 @@ class Live {
     const mine = () => this.attempt === attempt;
     socket.addEventListener("open", () => {
       const ahead = at("ahead").value;
-      socket.send(JSON.stringify({ type: "hello", sample_rate: rate, encoding: "f32le", channels: 1, reply: "points", seed: Math.floor(Math.random() * 1e6), lookahead: ahead === "" ? null : Number(ahead) }));
+      socket.send(JSON.stringify({ type: "hello", sample_rate: rate, encoding: "s16le", channels: 1, reply: "points", seed: Math.floor(Math.random() * 1e6), lookahead: ahead === "" ? null : Number(ahead) }));
       this.say("Preparing…");
     });
     socket.addEventListener("message", ({ data }) => {
@@ -96,11 +96,11 @@ class Live {
     this.began = null;
     capture.port.onmessage = ({ data }) => {
       if (this.socket.readyState !== WebSocket.OPEN) return;
-      if (this.socket.bufferedAmount > BACKLOG) { this.stop("The connection is too slow.", true); return; }
+      if (this.socket.bufferedAmount > BACKLOG * 2 * rate) { this.stop("The server is too slow for this: choose a run that computes less, or close other programs.", true); return; }
       this.socket.send(data);
       this.sent += data.length / rate;
       this.heard = performance.now();
-      const power = data.reduce((sum, x) => sum + x * x, 0) / data.length;
+      const power = data.reduce((sum, x) => sum + x * x, 0) / data.length / 32768 ** 2;
       this.loudness = clamp(1 + Math.log10(power + 1e-9) / 5, 0, 1);
     };
     this.delay = new DelayNode(context, { maxDelayTime: 20, delayTime: Math.min(20, this.latency + SHOWN_BEHIND) });
