@@ -2,6 +2,7 @@
 
 import argparse
 from dataclasses import replace
+from typing import Any
 
 from a2g_jax.cli import sampling
 from a2g_jax.cli.argument_types import count, number
@@ -16,15 +17,13 @@ DESCRIPTION = (
 )
 #: Further flags are settings.
 TAKES_SETTINGS = True
-#: The run, the port and the look-ahead where nothing else is named.
-RUN, PORT, LOOKAHEAD = "demo", 8765, 0.5
+#: The port, and seconds of the look-ahead, where no others are named.
+PORT, LOOKAHEAD = 8765, 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Flags of ``a2g serve``; those of settings are read later, since they depend on the run."""
-    parser.add_argument(
-        "run", nargs="?", default=RUN, metavar="RUN", help=f"a run folder or the name of a shipped run (default: {RUN})"
-    )
+    parser.add_argument("run", metavar="RUN", help="a run folder, or 'demo', 'demo-flow' or 'demo-emotion'")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default: 127.0.0.1, this computer)")
     port = number(int, 0, 65535, "a number from 0 to 65535")
     parser.add_argument("--port", type=port, default=PORT, help=f"default: {PORT}; 0 for one that is free")
@@ -83,20 +82,21 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     try:
         if (warning := exposure(options.host)) is not None:
             print(warning)
-        app = _application(options, settings)
+        app, server_options = _application(options, settings)
     except BaseException:
         bound.close()
         raise
-    serve(app, bound, lambda line: print(line, flush=True))
+    serve(app, bound, lambda line: print(line, flush=True), **server_options)
 
 
-def _application(options: argparse.Namespace, settings: object) -> object:
+def _application(options: argparse.Namespace, settings: Any) -> tuple[Any, dict[str, Any]]:
+    """The application, and settings of the process that runs it."""
     from a2g_jax.compilations import keep_compilations
     from a2g_jax.generation.delivery import Delivery
     from a2g_jax.io.character import read_character
     from a2g_jax.serving.app import make_app
     from a2g_jax.serving.live.page import lifespan, routes
-    from a2g_jax.serving.live.service import Limits, Service
+    from a2g_jax.serving.live.service import SERVER_OPTIONS, Limits, Service
     from a2g_jax.serving.security import Security
     from a2g_jax.training.run import open_run
 
@@ -110,4 +110,4 @@ def _application(options: argparse.Namespace, settings: object) -> object:
     print("compiling; a minute the first time, seconds later", flush=True)
     service.warm_up()
     security = Security(options.host, tuple(options.allow_host))
-    return make_app(routes(service, options.run), security, lifespan(service))
+    return make_app(routes(service, options.run), security, lifespan(service)), SERVER_OPTIONS

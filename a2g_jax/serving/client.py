@@ -55,7 +55,8 @@ async def converse(
 
     received = Received()
     try:
-        async with connect(url, max_size=2**24, compression=None) as socket:
+        # Without pings, whose answers would wait behind audio that the server has not read yet.
+        async with connect(url, max_size=2**24, compression=None, ping_interval=None) as socket:
             await socket.send(json.dumps({"sample_rate": sample_rate, "encoding": "f32le", "reply": "binary", **hello}))
             received.ready = _text(await socket.recv())
             start = time.monotonic()

@@ -55,7 +55,7 @@ def resident(process: int) -> float:
 async def refused(url: str, messages: list[str | bytes]) -> int:
     """The close code of a conversation."""
     try:
-        async with connect(url, max_size=None, compression=None) as client:
+        async with connect(url, max_size=None, compression=None, ping_interval=None) as client:
             for message in messages:
                 await client.send(message)
             async for _ in client:
@@ -71,7 +71,7 @@ async def vanish(url: str, audio: np.ndarray, number: int) -> None:
     """Connect, send some audio, and be gone without a close frame."""
     try:
         async with asyncio.timeout(60):
-            client = await connect(url, compression=None)
+            client = await connect(url, compression=None, ping_interval=None)
             await client.send(HELLO)
             await client.recv()
             for start in range(0, (number % 7) * 4000, 4000):

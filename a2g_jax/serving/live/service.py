@@ -14,6 +14,10 @@ from a2g_jax.generation.live.stream import Stream
 from a2g_jax.serving.live.protocol import MALFORMED, Hello, Refusal, checked_sampling
 from a2g_jax.training.run import Run
 
+#: Settings of the server's process. Without pings: the answer to one waits behind audio that is not read yet, so that a
+#: client that sends faster than it is read would be taken for dead. Silent ones are found by their silence.
+SERVER_OPTIONS: dict[str, Any] = {"ws_ping_interval": None}
+
 Result = TypeVar("Result")
 
 
