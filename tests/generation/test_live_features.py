@@ -126,3 +126,13 @@ def test_a_long_shout_does_not_raise_the_floor_for_ever():
     after = features.push(np.zeros(16000 * 120, np.float32))
     assert after[-1].max() < after[20].max() - 3.0 or after[20].max() <= features.quiet.max() + 1.0
     assert after[-1].max() == pytest.approx(float(features.quiet.max()), abs=1.0)
+
+
+def test_features_after_ten_hours_are_those_of_the_first_second():
+    """Counters are whole numbers, and the time of a spectrum is exact: nothing drifts."""
+    config, audio = MelConfig(bands=16), talk(2.0, 5).audio
+    fresh, late = LiveFeatures(config, 30.0, 16000), LiveFeatures(config, 30.0, 16000)
+    late._made += 36000 * 30
+    late._first += 36000 * 16000
+    late._metered += 36000 * 16000
+    np.testing.assert_array_equal(np.array(late.push(audio)), np.array(fresh.push(audio)))

@@ -2,9 +2,11 @@
 
 import asyncio
 import json
+import re
 import socket
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from websockets.sync.client import connect
 
 from a2g_jax.generation.delivery import Delivery
 from a2g_jax.io.character import read_character
+from a2g_jax.io.audio import write_audio
+from a2g_jax.serving import client
 from a2g_jax.serving.client import converse
 from a2g_jax.serving.live.drawn import Drawn
 from a2g_jax.serving.live.protocol import frames_binary, quaternions, read_binary
@@ -164,3 +168,24 @@ def test_frames_of_a_character_are_those_of_its_file(live, motion, kind, tmp_pat
         points = read_binary(drawn.points(motion.clip(first, first + 3), first), 3 * drawn.figure()["points"])[1]
         shown = shape_points(whole.shown, build_shape(whole.shown.skeleton))[first : first + 3]
         np.testing.assert_allclose(points, shown.reshape(3, -1), atol=1e-4)
+
+
+def test_the_example_of_the_guide(live, capsys):
+    guide = (Path(__file__).parents[2] / "docs" / "live.md").read_text(encoding="utf-8")
+    example = next(block for block in re.findall(r"```python\n(.*?)```", guide, re.DOTALL) if "websockets" in block)
+    exec(compile(example.replace("ws://127.0.0.1:8765/live", socket_url(live.url)), "live.md", "exec"), {})  # noqa: S102
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 1 + 60
+    assert printed[-1].startswith("59 [")
+
+
+def test_the_client_writes_what_it_gets(live, tmp_path, capsys):
+    write_audio(tmp_path / "speech.wav", speech() / np.float32(32768), RATE)
+    url, out = socket_url(live.url), tmp_path / "motion.npz"
+    assert client.main([str(tmp_path / "speech.wav"), url, "--out", str(out), "--pace", "0"]) == 0
+    assert "30 frames at 30 fps for 1.00 s" in capsys.readouterr().out
+    with np.load(out) as arrays:
+        assert arrays["rotations"].shape == (30, len(arrays["joints"]), 4)
+    assert client.main([str(tmp_path / "speech.wav"), url.replace("/live", "/other")]) == 2
+    assert client.main([str(tmp_path / "none.wav"), url]) == 2
+    assert capsys.readouterr().err.count("\n") == 2
