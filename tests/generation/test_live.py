@@ -126,6 +126,22 @@ def test_memory_is_bounded(stream):
     assert max(sizes) < 20_000_000
 
 
+def test_poses_after_ten_hours_are_as_those_of_the_first_second(stream):
+    """The number of the frame is exact in the compiled program, and noise is drawn for it."""
+    program = stream._program
+    window = np.random.default_rng(0).normal(size=(program.rows, stream.run.config.mel.width)).astype(np.float32)
+    key, state = program.begin(3)
+    late = 36000 * 30 // program.hop * program.hop
+    spread = []
+    for frame in (0, late, late + program.hop, 20 * late):
+        poses, _ = program.advance(key, state, window, frame)
+        assert np.isfinite(poses).all()
+        spread.append(poses)
+    for other in spread[1:]:
+        assert 1e-6 < np.abs(other - spread[0]).max() < 5.0
+    assert np.abs(spread[1] - spread[2]).max() > 1e-6
+
+
 COMPILED = []
 jax.monitoring.register_event_duration_secs_listener(
     lambda name, seconds, **_: COMPILED.append(name) if "compile" in name else None

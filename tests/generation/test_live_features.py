@@ -7,7 +7,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig, active_level_db, log_mel
 from a2g_jax.generation.live.features import LiveFeatures
 from a2g_jax.generation.live.loudness import Loudness
-from a2g_jax.generation.live.resampler import Resampler
+from a2g_jax.generation.live.rates import Groups
 from a2g_jax.io.audio import resampled
 from a2g_jax.talker.recordings import talk
 
@@ -20,14 +20,14 @@ def tone(hertz, rate, seconds=1.0):
 
 @pytest.mark.parametrize("rate", RATES)
 def test_a_tone_keeps_its_time_and_level(rate):
-    out = np.concatenate(Resampler(rate, 16000, 160).push(tone(1000, rate)))
+    out = np.concatenate(Groups(rate, 16000, 160).push(tone(1000, rate)))
     middle = slice(500, 15000)
     np.testing.assert_allclose(out[middle], tone(1000, 16000)[: len(out)][middle], atol=2e-3)
 
 
 @pytest.mark.parametrize("rate", [44100, 48000, 96000])
 def test_nothing_is_folded_back(rate):
-    out = np.concatenate(Resampler(rate, 16000, 160).push(tone(9500, rate)))
+    out = np.concatenate(Groups(rate, 16000, 160).push(tone(9500, rate)))
     assert np.abs(out[500:15000]).max() < 2e-3
 
 
@@ -35,11 +35,20 @@ def test_nothing_is_folded_back(rate):
 def test_resampling_does_not_depend_on_the_pieces(rate):
     rng = np.random.default_rng(0)
     samples = rng.standard_normal(rate // 2).astype(np.float32)
-    whole = np.concatenate(Resampler(rate, 16000, 160).push(samples))
-    one = Resampler(rate, 16000, 160)
+    whole = np.concatenate(Groups(rate, 16000, 160).push(samples))
+    one = Groups(rate, 16000, 160)
     pieces = np.split(samples, np.sort(rng.integers(0, len(samples), 30)))
     np.testing.assert_array_equal(np.concatenate([group for piece in pieces for group in one.push(piece)]), whole)
-    assert len(one._kept) <= 2 * one.reach + rate * 0.02
+    assert len(one._kept) < one.group
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_outputs_arrive_within_the_stated_latency(rate):
+    one, made, step = Groups(rate, 16000, 160), 0, rate // 250
+    for number in range(1, 1500):
+        made += 160 * len(one.push(np.zeros(step, np.float32)))
+        assert made / 16000 >= number * step / rate - one.latency
+    assert made > 0
 
 
 @pytest.mark.parametrize("rate", [0, -1, 7999, 192001, True, 16000.5])
@@ -117,3 +126,13 @@ def test_a_long_shout_does_not_raise_the_floor_for_ever():
     after = features.push(np.zeros(16000 * 120, np.float32))
     assert after[-1].max() < after[20].max() - 3.0 or after[20].max() <= features.quiet.max() + 1.0
     assert after[-1].max() == pytest.approx(float(features.quiet.max()), abs=1.0)
+
+
+def test_features_after_ten_hours_are_those_of_the_first_second():
+    """Counters are whole numbers, and the time of a spectrum is exact: nothing drifts."""
+    config, audio = MelConfig(bands=16), talk(2.0, 5).audio
+    fresh, late = LiveFeatures(config, 30.0, 16000), LiveFeatures(config, 30.0, 16000)
+    late._made += 36000 * 30
+    late._first += 36000 * 16000
+    late._metered += 36000 * 16000
+    np.testing.assert_array_equal(np.array(late.push(audio)), np.array(fresh.push(audio)))

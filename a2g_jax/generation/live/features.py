@@ -6,7 +6,7 @@ from scipy import fft, signal
 
 from a2g_jax.features.mel import MelConfig, mel_filters
 from a2g_jax.generation.live.loudness import Loudness
-from a2g_jax.generation.live.resampler import Resampler
+from a2g_jax.generation.live.rates import Groups
 
 #: Seconds of the groups in which samples are processed.
 GROUP = 0.01
@@ -38,7 +38,7 @@ class LiveFeatures:
         """
         self.config, self.fps = config, fps
         group, self._piece = round(GROUP * config.sample_rate), int(sample_rate)
-        self._resampler = Resampler(sample_rate, config.sample_rate, group)
+        self._resampler = Groups(sample_rate, config.sample_rate, group)
         pole = float(np.exp(-1.0 / (OFFSET * config.sample_rate)))
         self._high_pass = np.array([1.0, -1.0]) * (1.0 + pole) / 2.0, np.array([1.0, -pole])
         self._rest: Float[np.ndarray, " 1"] | None = None

@@ -51,6 +51,8 @@ class PoseProgram:
         # Whatever the model does with the frames around them is over after its halo.
         most = model.halo if model.begin is None else max(model.lookahead, model.overlap)
         least = 0 if model.begin is None else model.overlap
+        #: Frames of speech that a frame can wait for: the fewest and the most.
+        self.lookaheads = least, most
         self.lookahead = most if lookahead is None else max(least, min(lookahead, most))
         self.before = model.halo + (JOINED if model.begin is None else 0)
         autoregressive = model.begin is not None

@@ -10,7 +10,7 @@ from a2g_jax.features.samples import mono_samples
 from a2g_jax.generation.live.features import LiveFeatures
 from a2g_jax.generation.live.feet import Feet
 from a2g_jax.generation.live.poses import PoseProgram, Poses
-from a2g_jax.generation.live.resampler import check_rate
+from a2g_jax.generation.live.rates import check_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.training.run import Run
@@ -97,6 +97,12 @@ class Stream:
             program.lookahead * frame, self._features.latency, self._feet.delay * frame, (program.hop - 1) * frame
         )
 
+    @property
+    def lookaheads(self) -> tuple[float, float]:
+        """The shortest and the longest look-ahead that the model has, seconds."""
+        least, most = self._program.lookaheads
+        return least / self.fps, most / self.fps
+
     def warm_up(self) -> None:
         """Compile everything; the motion is the same without it, but its first frames wait for it."""
         program, features = self._program, LiveFeatures(self.run.config.mel, self.fps, self.sample_rate)
@@ -107,10 +113,18 @@ class Stream:
             poses, state = program.advance(key, state, window, frame)
         Feet(self.run.config, program.hop).push(rotations_from_rows(poses, self.run.config.space.kind))
 
-    def restarted(self, seed: int) -> "Stream":
-        """Another stream from its first frame on, which shares what is compiled with this one."""
+    def restarted(self, seed: int, sample_rate: int | float | None = None) -> "Stream":
+        """Another stream from its first frame on, which shares what is compiled with this one.
+
+        Args:
+            sample_rate: of its samples, Hz; None for that of this one.
+
+        Raises:
+            InputError: a seed out of range, or a rate that no microphone has.
+        """
         stream = object.__new__(Stream)
-        stream.run, stream.sample_rate, stream._seed = self.run, self.sample_rate, _seed(seed)
+        rate = self.sample_rate if sample_rate is None else check_rate(sample_rate)
+        stream.run, stream.sample_rate, stream._seed = self.run, rate, _seed(seed)
         stream._program = self._program
         stream._start()
         return stream

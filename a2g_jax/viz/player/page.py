@@ -11,10 +11,12 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
+from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import atomic_path
 from a2g_jax.io.words import Word
 from a2g_jax.viz.player.encode import encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
+from a2g_jax.viz.player.parts import Shape
 from a2g_jax.viz.player.shape import build_shape
 from a2g_jax.viz.player.sound import encode_audio, playback_note
 from a2g_jax.viz.player.stage import placement, shape_points
@@ -107,11 +109,21 @@ def page_html(
             "title": html.escape(title),
             "subtitle": html.escape(subtitle),
             "footer": html.escape(footer),
-            "style": _template("player.css"),
-            "script": "\n".join(_template(f"{name}.js") for name in _SCRIPTS),
+            "style": style(),
+            "script": scripts(_SCRIPTS),
             "data": script_json(data),
         },
     )
+
+
+def scripts(names: Sequence[str]) -> str:
+    """Parts of the player's script, one after the other; they share one scope."""
+    return "\n".join(_template(f"{name}.js") for name in names)
+
+
+def style() -> str:
+    """The player's style sheet."""
+    return _template("player.css")
 
 
 def fill_template(template: str, values: dict[str, str]) -> str:
@@ -140,21 +152,27 @@ def _figure(figure: Figure) -> dict:
         raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
     shape = build_shape(motion.skeleton)
     points = shape_points(motion, shape)
-    encoded = encode_positions(points, figure.label)
     return {
         "label": figure.label,
         "note": figure.note,
-        "fps": motion.fps,
         "frames": motion.frames,
+        "tracks": [track.encoded() for track in figure.tracks],
+        "files": list(figure.files),
+        **drawn_body(motion, shape, points),
+        **encode_positions(points, figure.label),
+    }
+
+
+def drawn_body(motion: Motion, shape: Shape, points: Float[np.ndarray, "T P 3"]) -> dict:
+    """What the page needs to draw a body at any positions of its points: cones between them, and its place."""
+    return {
+        "fps": motion.fps,
         "joints": list(motion.skeleton.names),
         "points": len(shape.points),
         "axes": shape.frames,
         "shapes": [cone.encoded() for cone in shape.cones],
         "wrists": list(shape.wrists),
         "place": placement(motion, points),
-        "tracks": [track.encoded() for track in figure.tracks],
-        "files": list(figure.files),
-        **encoded,
     }
 
 

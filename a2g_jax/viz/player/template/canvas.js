@@ -96,3 +96,16 @@ class CanvasRenderer {
     g.closePath();
   }
 }
+
+// WebGL 2 where it works and is wanted, else a 2D canvas.
+function makeRenderer(canvas, wanted) {
+  if (!wanted) return new CanvasRenderer(canvas);
+  try {
+    return WebGLRenderer.create(canvas) || new CanvasRenderer(canvas);
+  } catch (error) {
+    console.warn("WebGL 2 failed, drawing without it:", error.message);
+    const fresh = canvas.cloneNode(true);
+    canvas.replaceWith(fresh);
+    return new CanvasRenderer(fresh);
+  }
+}

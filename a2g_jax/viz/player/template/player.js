@@ -16,7 +16,7 @@ class Player {
     this.only = null;
     this.overlay = this.trails = this.loop = false;
     this.scheme = matchMedia("(prefers-color-scheme: dark)");
-    this.renderer = this.makeRenderer();
+    this.renderer = makeRenderer(this.element("view"), location.hash !== "#2d");
     this.timeline = new Timeline(this);
     this.audio = this.loadAudio(speech);
     this.makeLabels();
@@ -32,20 +32,6 @@ class Player {
     this.clock = performance.now();
     this.ready = new Promise((done) => { this.opened = done; });
     this.wake();
-  }
-
-  makeRenderer() {
-    const canvas = this.element("view");
-    let made = null;
-    if (location.hash !== "#2d") {
-      try { made = WebGLRenderer.create(canvas); } catch (error) {
-        console.warn("WebGL 2 failed, drawing without it:", error.message);
-        const fresh = canvas.cloneNode(true);
-        canvas.replaceWith(fresh);
-        return new CanvasRenderer(fresh);
-      }
-    }
-    return made || new CanvasRenderer(canvas);
   }
 
   loadAudio(speech) {

@@ -1,0 +1,1 @@
+"""Live motion over a WebSocket: protocol, sessions, and the page with a microphone."""

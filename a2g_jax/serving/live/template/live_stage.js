@@ -1,0 +1,47 @@
+// The stage with one figure; the renderer, the camera and the layout are those of the written page.
+
+class LiveStage {
+  constructor() {
+    this.stage = document.getElementById("stage");
+    this.scheme = matchMedia("(prefers-color-scheme: dark)");
+    this.renderer = makeRenderer(document.getElementById("view"), location.hash !== "#2d");
+    this.camera = { ...START };
+    this.bands = [];
+    this.figure = null;
+    this.time = 0;
+    this.trails = false;
+    attachCamera(document.getElementById("view"), this);
+    for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => this.view(VIEWS[button.dataset.view]));
+    this.scheme.addEventListener("change", () => this.wake());
+    new ResizeObserver(() => { this.stale = true; this.wake(); }).observe(this.stage);
+  }
+
+  show(figure) { this.figure = figure; this.stale = true; this.time = 0; this.wake(); }
+
+  view(change) { Object.assign(this.camera, change); this.wake(); }
+
+  // `ticking`, if set, is called before each picture and says whether another one follows.
+  wake() {
+    if (this.pending) return;
+    this.pending = requestAnimationFrame((stamp) => {
+      this.pending = 0;
+      const more = this.ticking ? this.ticking(stamp) : false;
+      this.draw(!more);
+      if (more) this.wake();
+    });
+  }
+
+  draw(still) {
+    const width = this.stage.clientWidth, height = this.stage.clientHeight;
+    if (!this.figure || width < 2 || height < 2) return;
+    if (this.stale) { this.bands = arrange([this.figure], [0], false, width, height); this.stale = false; }
+    const theme = THEMES[this.scheme.matches ? "dark" : "light"], [band] = this.bands, { figure } = this;
+    placeCamera(band, this.camera);
+    figure.update(this.time, this.camera.yaw, band.slots[0], theme, this.trails);
+    band.figures = [{ capsules: figure.capsules, count: figure.count, shapes: figure.shapeList.length, thick: figure.thick, shaders: figure.shaders }];
+    const ratio = Math.min(window.devicePixelRatio || 1, 2), moving = this.renderer.scale;
+    if (still) this.renderer.scale = this.renderer.software && ratio < 2 ? 2 : 1;
+    this.renderer.render({ bands: this.bands, width, height, ratio, theme, yaw: this.camera.yaw, overlay: false, still });
+    this.renderer.scale = moving;
+  }
+}
