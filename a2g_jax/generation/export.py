@@ -92,7 +92,7 @@ def export(
                 audio,
                 config.mel.sample_rate,
                 title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-                subtitle=_requested(checked, samples, label),
+                subtitle=requested(checked, samples, label),
                 words=words,
                 lanes=lanes,
                 footer=f"{config.model}, {config.preset} preset, {run.steps} training steps, seed {seed}",
@@ -100,7 +100,7 @@ def export(
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def _requested(checked: Checked, samples: int, label: str) -> str:
+def requested(checked: Checked, samples: int, label: str) -> str:
     """What the page shows, and what was requested."""
     what = "The same speech, and different gestures for it" if samples > 1 else ""
     controls = " ".join(getattr(checked.run.config.sampling_settings, "controls", ()))
