@@ -1,4 +1,4 @@
-"""Progress on standard error: a bar in a terminal, a line every ten seconds in a log file; and checkpoints of long work.
+"""Progress on standard error: a bar in a terminal, a line every ten seconds in a log file; checkpoints of long work.
 
 A server that runs the work has no terminal, and has to stop it on request: it watches the checkpoints.
 """

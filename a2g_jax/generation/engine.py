@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import check_rows, check_stored, stored_rows
-from a2g_jax.models.base import Condition
+from a2g_jax.models.base import Condition, Model
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.progress import checkpoint
 from a2g_jax.training.run import Run
@@ -25,6 +25,18 @@ WINDOW = 1024
 LANES = 4
 #: Fields of a condition with a row for each frame.
 _BY_FRAME = ("emotion", "words", "controls", "latents")
+
+
+def check_generates(run: Run) -> Model:
+    """The model of a run.
+
+    Raises:
+        InputError: it does not generate motion from audio.
+    """
+    model = run.config.build()
+    if model.condition is None or model.sample is None:
+        raise InputError(f"{run.config.model}: generates no motion from audio; name a run of a model that does.")
+    return model
 
 
 class Engine:
@@ -43,9 +55,9 @@ class Engine:
             InputError: the run's model does not generate motion from audio.
         """
         self.run, self.window = run, window
-        model = self.model = run.config.build()
-        if model.condition is None or model.sample is None:
-            raise InputError(f"{run.config.model}: generates no motion from audio; name a run of a model that does.")
+        model = self.model = check_generates(run)
+        assert model.condition is not None
+        assert model.sample is not None
         self.halo = -(-model.halo // BLOCK) * BLOCK
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
