@@ -22,6 +22,7 @@ LAYERS = (
     ("generation",),
     ("evaluation",),
     ("inspection",),
+    ("serving",),
     ("cli",),
 )
 LEVEL = {room: number for number, rooms in enumerate(LAYERS) for room in rooms}
