@@ -117,12 +117,13 @@ class Ready:
         return [*self.delivery.lines(), *self.chosen.report(out)]
 
 
-def prepare(options: argparse.Namespace, settings: Any) -> Ready:
+def prepare(options: argparse.Namespace, settings: Any, opened: "Run | None" = None) -> Ready:
     """Read everything that a request names: the run, the speech, its words, clips and the character.
 
     Args:
         options: checked with :func:`check`.
         settings: sampling settings, of :func:`a2g_jax.cli.sampling.sampling_settings`.
+        opened: the run, where it is open already.
 
     Raises:
         InputError: a run, audio, clip or character that cannot be used.
@@ -130,7 +131,7 @@ def prepare(options: argparse.Namespace, settings: Any) -> Ready:
     from a2g_jax.training.run import open_run
 
     delivery = characters.delivery(options)
-    opened = open_run(options.run)
+    opened = open_run(options.run) if opened is None else opened
     trained = replace(opened, config=replace(opened.config, sampling=settings))
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
     lines = tuple(characters.lines(delivery, trained))

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
-from a2g_jax.cli import demo, evaluate, generate, inspect, label, prepare, retarget, talk, train
+from a2g_jax.cli import demo, evaluate, generate, inspect, label, prepare, retarget, studio, talk, train
 from a2g_jax.errors import A2GError, InputWarning, Interrupted
 
 #: The module of each command: ``DESCRIPTION``, ``add_arguments(parser)`` and ``run(options, extra)``, which returns
@@ -24,6 +24,7 @@ COMMANDS: dict[str, ModuleType] = {
     "inspect": inspect,
     "evaluate": evaluate,
     "retarget": retarget,
+    "studio": studio,
 }
 
 

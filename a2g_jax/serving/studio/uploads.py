@@ -89,11 +89,9 @@ class Uploads:
             raise InputError(f"no uploads of the kind {brief(kind)!r}.")
         return Incoming(self, kind, display_name(name))
 
-    def named(self, text: str) -> str:
-        """A message with the names of the files as the client knows them."""
-        for upload in list(self._kept.values()):
-            text = text.replace(str(upload.path), upload.name).replace(upload.path.name, upload.name)
-        return text
+    def all(self) -> list[Upload]:
+        """All files, the oldest first."""
+        return list(self._kept.values())
 
     def drop_oldest(self, used: Iterable[Path] = ()) -> None:
         """Remove the oldest files over the limits, apart from those in use."""
