@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from a2g_jax.cli import generate, sampling
 from a2g_jax.cli.argument_types import number
@@ -16,7 +16,6 @@ from a2g_jax.training.run_file import SHIPPED
 
 if TYPE_CHECKING:
     from a2g_jax.generation.capabilities import Capabilities
-    from a2g_jax.generation.checked import Checked
     from a2g_jax.serving.studio.jobs import Job
     from a2g_jax.serving.studio.studio import Studio
     from a2g_jax.serving.studio.takes import Outcome
@@ -143,7 +142,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         InputError: what the command refuses.
     """
     from a2g_jax.generation.checked import Checked
-    from a2g_jax.generation.export import checked_figure, export, requested
+    from a2g_jax.generation.export import describe_findings, export, requested
     from a2g_jax.io.audio import write_audio
     from a2g_jax.serving.studio.takes import SPEECH, Outcome
 
@@ -171,13 +170,13 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         delivery=ready.delivery,
     )
     write_audio(folder / SPEECH, ready.audio, rate)
-    figures = [checked_figure(None, "", report.findings) for report in checked.reports]
+    described = [describe_findings(report.findings, options.fps or ready.run.config.fps) for report in checked.reports]
     return Outcome(
         seconds=len(ready.audio) / rate,
         subtitle=requested(checked, options.samples, label),
         lanes=tuple(lanes),
-        notes=tuple(figure.note for figure in figures),
-        tracks=tuple(figure.tracks for figure in figures),
+        notes=tuple(note for note, _ in described),
+        tracks=tuple(tracks for _, tracks in described),
         lines=(*ready.lines, *checked.lines(), *ready.report(folder)),
     )
 

@@ -41,6 +41,8 @@ class Setting:
 class Capabilities:
     """What can be requested of a run."""
 
+    title: str = ""
+    """Model and frame rate."""
     controls: tuple[str, ...] = ()
     """Names of controls with quantiles from 0 to 1 as values."""
     categories: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
@@ -75,6 +77,7 @@ def capabilities(run: Run) -> Capabilities:
     stored = config.sampling_settings
     has_emotion = any(field.name == "emotion" for field in dataclasses.fields(stored))
     return Capabilities(
+        title=f"{config.model}, {config.fps:g} frames a second",
         controls=tuple(public_name(name) for name in names if public_name(name) not in categories),
         categories=categories,
         emotions=tuple(config.corpus.get("emotions", ())) if has_emotion else (),

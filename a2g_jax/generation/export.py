@@ -125,10 +125,14 @@ def checked_figure(
     """
     if not findings:
         return Figure(motion, label, note, files=files)
+    return Figure(motion, label, *describe_findings(findings, motion.fps), files)
+
+
+def describe_findings(findings: Sequence[BodyFinding], fps: float) -> tuple[str, tuple[Track, ...]]:
+    """The worst finding for the text under a figure, and a lane of all; empty without any."""
+    if not findings:
+        return "", ()
     spans = tuple(
-        (one.first / motion.fps, one.stop / motion.fps, str(one), "#c0392b")
-        for one in sorted(findings, key=lambda one: one.first)
+        (one.first / fps, one.stop / fps, str(one), "#c0392b") for one in sorted(findings, key=lambda one: one.first)
     )
-    return Figure(
-        motion, label, f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),), files
-    )
+    return f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),)

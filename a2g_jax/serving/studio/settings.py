@@ -6,7 +6,7 @@ flag, and the command's own checks judge it. Files are named by identifiers of u
 
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,7 +109,7 @@ def read_request(values: Any, systems: Mapping[str, str], uploads: Uploads) -> R
         arguments.append(f"--to={rig}")
         formats = f"{character_suffix(rig).removeprefix('.')},npz"
     arguments += _settings(values.get("settings", {}))
-    shown = shlex.join(["a2g", "generate", *(_named(one, used) for one in arguments), "--out=gestures"])
+    shown = shlex.join(["a2g", "generate", *(named(one, used) for one in arguments), "--out=gestures"])
     return Request(
         system, used[0], samples, (*arguments, f"--formats={formats}"), shown, tuple(used), character=rig is not None
     )
@@ -134,13 +134,13 @@ def field_of(message: str, request: Request) -> dict[str, str]:
         if not field and str(upload.path) in message:
             field = {"speech": "speech", "character": "character"}.get(upload.kind, "")
         text = text.replace(f"{upload.path}: ", f"{upload.name}: ")
-    text = _named(text, request.used)
+    text = named(text, request.used)
     text = text.replace("--samples", "the number of samples").replace("--seed", "the seed")
     text = re.sub(r" \(see 'a2g [^']*'\)", "", text)
     return {"field": field, "message": text[:1].upper() + text[1:]}
 
 
-def _named(text: str, used: Sequence[Upload]) -> str:
+def named(text: str, used: Sequence[Upload]) -> str:
     """Text with the client's names of files."""
     for upload in used:
         text = text.replace(str(upload.path), upload.name).replace(upload.path.name, upload.name)
@@ -253,7 +253,3 @@ def _whole(value: object, field: str, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise FieldError(field, f"expected a whole number from {low} to {high}; got {brief(value)!r}.")
     return value
-
-
-#: Turns the message of an error into what the page shows.
-Explained = Callable[[str], dict[str, str]]

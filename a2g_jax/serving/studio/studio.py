@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +18,7 @@ from a2g_jax.io.temporary import remove, temporary_path
 from a2g_jax.io.words import Word
 from a2g_jax.serving.studio.jobs import DONE, Job, Jobs
 from a2g_jax.serving.studio.readers import KINDS
-from a2g_jax.serving.studio.settings import MOST_SAMPLES, field_of, read_request
+from a2g_jax.serving.studio.settings import MOST_SAMPLES, field_of, named, read_request
 from a2g_jax.serving.studio.takes import (
     MOST_STARS,
     Generate,
@@ -30,6 +30,7 @@ from a2g_jax.serving.studio.takes import (
     takes_page,
 )
 from a2g_jax.serving.studio.uploads import Kind, Upload, Uploads
+from a2g_jax.viz.player import Track
 
 #: Takes that are kept; the oldest without stars make room, then the oldest.
 MOST_TAKES = 24
@@ -170,7 +171,7 @@ class Studio:
         length = outcome.seconds * take.request.samples
         if length > 0:
             self._pace[take.request.system] = job.seconds() / length
-        return outcome
+        return with_client_names(outcome, take.request.used)
 
     def find(self, id: str) -> Take:
         """A take.
@@ -285,3 +286,15 @@ class Studio:
                 return
             del self.takes[take.id]
             shutil.rmtree(take.folder, ignore_errors=True)
+
+
+def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:
+    """The texts of an outcome with the names that the client has for its files."""
+    lanes = tuple(
+        replace(lane, spans=tuple((*span[:2], named(span[2], used), *span[3:]) for span in lane.spans))
+        if isinstance(lane, Track)
+        else lane
+        for lane in outcome.lanes
+    )
+    lines = tuple(named(line, used) for line in outcome.lines)
+    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines)
