@@ -170,7 +170,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         delivery=ready.delivery,
     )
     write_audio(folder / SPEECH, ready.audio, rate)
-    described = [describe_findings(report.findings, options.fps or ready.run.config.fps) for report in checked.reports]
+    described = [describe_findings(report.findings, ready.run.config.fps) for report in checked.reports]
     return Outcome(
         seconds=len(ready.audio) / rate,
         subtitle=requested(checked, options.samples, label),

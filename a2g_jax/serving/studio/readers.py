@@ -16,7 +16,7 @@ MOST_CLIP_SECONDS = 300.0
 PEAKS = 600
 
 _SPEECH = (
-    ".wav", ".mp3", ".mp4", ".m4a", ".flac", ".ogg", ".opus", ".aif", ".aiff", ".au", ".caf", ".w64", ".aac", ".mov",
+    ".wav", ".mp3", ".mp4", ".m4a", ".flac", ".ogg", ".opus", ".aif", ".aiff", ".caf", ".w64", ".aac", ".mov",
     ".m4v", ".webm", ".mkv", ".mka", ".3gp", ".wma", ".wmv", ".amr", ".avi",
 )  # fmt: skip
 

@@ -134,7 +134,7 @@ class _Api:
 
     async def request(self, request: Request) -> Response:
         try:
-            take = self.studio.request(await _json(request))
+            take = await _thread(self.studio.request, await _json(request))
         except FieldError as error:
             return JSONResponse({"field": error.field, "message": str(error)}, 422)
         return JSONResponse(take.to_json(), 202)

@@ -6,13 +6,13 @@ flag, and the command's own checks judge it. Files are named by identifiers of u
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from a2g_jax.errors import InputError, brief
 from a2g_jax.io.character import character_suffix
-from a2g_jax.serving.studio.uploads import Upload, Uploads
+from a2g_jax.serving.studio.uploads import Upload, Uploads, with_client_name
 
 #: Samples of one request at most: more do not fit side by side.
 MOST_SAMPLES = 12
@@ -65,12 +65,15 @@ class FieldError(InputError):
         self.field = field
 
 
-def read_request(values: Any, systems: Mapping[str, str], uploads: Uploads) -> Request:
+def read_request(
+    values: Any, systems: Mapping[str, str], uploads: Uploads, settings: Callable[[str], Container[str]]
+) -> Request:
     """Check the form of a request, and write it as arguments; the command checks values.
 
     Args:
         values: JSON of the page.
         systems: names of runs by what the page calls them.
+        settings: names of a system's sampling settings; other flags of the command, which name files, are refused.
 
     Raises:
         FieldError: a field that is missing, unknown or of another form.
@@ -108,7 +111,8 @@ def read_request(values: Any, systems: Mapping[str, str], uploads: Uploads) -> R
     if (rig := file("character", "character")) is not None:
         arguments.append(f"--to={rig}")
         formats = f"{character_suffix(rig).removeprefix('.')},npz"
-    arguments += _settings(values.get("settings", {}))
+    if changed := values.get("settings"):
+        arguments += _settings(changed, settings(system))
     shown = shlex.join(["a2g", "generate", *(named(one, used) for one in arguments), "--out=gestures"])
     return Request(
         system, used[0], samples, (*arguments, f"--formats={formats}"), shown, tuple(used), character=rig is not None
@@ -133,7 +137,6 @@ def field_of(message: str, request: Request) -> dict[str, str]:
     for upload in request.used:
         if not field and str(upload.path) in message:
             field = {"speech": "speech", "character": "character"}.get(upload.kind, "")
-        text = text.replace(f"{upload.path}: ", f"{upload.name}: ")
     text = named(text, request.used)
     text = text.replace("--samples", "the number of samples").replace("--seed", "the seed")
     text = re.sub(r" \(see 'a2g [^']*'\)", "", text)
@@ -143,7 +146,7 @@ def field_of(message: str, request: Request) -> dict[str, str]:
 def named(text: str, used: Sequence[Upload]) -> str:
     """Text with the client's names of files."""
     for upload in used:
-        text = text.replace(str(upload.path), upload.name).replace(upload.path.name, upload.name)
+        text = with_client_name(text, upload.path, upload.name)
     return text
 
 
@@ -211,7 +214,7 @@ def _value(value: object, field: str) -> str:
     return f"{_number(value, field):.4g}"
 
 
-def _settings(settings: object) -> list[str]:
+def _settings(settings: object, known: Container[str]) -> list[str]:
     """Flags of sampling settings that the page changes."""
     if not isinstance(settings, dict):
         raise FieldError("settings", "expected values by the names of settings.")
@@ -219,8 +222,8 @@ def _settings(settings: object) -> list[str]:
     for name, value in settings.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise FieldError("settings", f"no setting {brief(name)!r}.")
-        if f"--{name}" in _FIELDS:
-            raise FieldError(f"settings.{name}", "has a field of its own.")
+        if name not in known:
+            raise FieldError(f"settings.{name}", f"this system has no setting {name!r}.")
         values = value if isinstance(value, list) else [value]
         flags += [f"--{name}={_text(one, f'settings.{name}')}" for one in values]
     return flags

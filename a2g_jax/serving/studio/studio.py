@@ -110,10 +110,16 @@ class Studio:
         """
         if system not in self.systems:
             raise InputError(f"no system {system!r}; there are {', '.join(self.systems)}.")
+        return {"name": system, **asdict(self._capabilities(system))}
+
+    def _capabilities(self, system: str) -> Capabilities:
         with self._describing:  # a run is opened once, however many pages wait for it
             if system not in self._described:
                 self._described[system] = self._describe(self.systems[system])
-        return {"name": system, **asdict(self._described[system])}
+            return self._described[system]
+
+    def _settings_of(self, system: str) -> set[str]:
+        return {setting.name for setting in self._capabilities(system).settings}
 
     def about(self) -> dict[str, Any]:
         """What the page has to know at its start."""
@@ -142,7 +148,7 @@ class Studio:
             FieldError: a request that has another form.
             InputError: too many requests wait.
         """
-        request = read_request(values, self.systems, self.uploads)
+        request = read_request(values, self.systems, self.uploads, self._settings_of)
         folder = self.folder / f"take-{secrets.token_hex(8)}"
         seconds = float(request.speech.about.get("seconds", 0.0))
         pace = self._pace.get(request.system)
@@ -170,7 +176,9 @@ class Studio:
             raise
         length = outcome.seconds * take.request.samples
         if length > 0:
-            self._pace[take.request.system] = job.seconds() / length
+            # The first one of a system compiles its programs, which the next ones do not.
+            pace = job.seconds() / length
+            self._pace[take.request.system] = min(pace, self._pace.get(take.request.system, pace))
         return with_client_names(outcome, take.request.used)
 
     def find(self, id: str) -> Take:

@@ -14,6 +14,8 @@ from a2g_jax.errors import InputError, brief
 
 #: Files that are kept at most, and their bytes together; the oldest make room.
 MOST_FILES, MOST_BYTES = 64, 2_000_000_000
+#: Beginning of the server's own names.
+PREFIX = "upload-"
 _LONGEST_NAME = 120
 
 
@@ -127,7 +129,7 @@ class Incoming:
 
     def __enter__(self) -> "Incoming":
         self._id = secrets.token_hex(8)
-        self.path = self._uploads.folder / f"upload-{self._id}{self._suffix}"
+        self.path = self._uploads.folder / f"{PREFIX}{self._id}{self._suffix}"
         self._file: IO[bytes] = self.path.open("xb")
         return self
 
@@ -170,8 +172,16 @@ class Incoming:
     def _plain(self, value: Any) -> Any:
         """Text with the client's name in place of the server's."""
         if isinstance(value, str):
-            return " ".join(value.replace(str(self.path), self._name).replace(self.path.name, self._name).split())
+            return " ".join(with_client_name(value, self.path, self._name).split())
         return [self._plain(one) for one in value] if isinstance(value, list) else value
+
+
+def with_client_name(text: str, path: Path, name: str) -> str:
+    """A text with the client's name of a file in place of the server's, also in names derived from it."""
+    text = text.replace(str(path), name).replace(path.name, name)
+    if path.stem.startswith(PREFIX):
+        text = text.replace(str(path.parent / path.stem), Path(name).stem).replace(path.stem, Path(name).stem)
+    return text
 
 
 def display_name(name: str) -> str:

@@ -2,13 +2,13 @@
 
 import { post, remove } from "./api.js";
 import { clock, duration, find, make, number, showError, tell } from "./dom.js";
-import { isShown, keepOnly, onShown, show, toggle } from "./player.js";
+import { isShown, keepOnly, onShown, show, shownSamples, toggle } from "./player.js";
 
 const ENDED = ["done", "failed", "cancelled"];
 const NAMES = { bvh: "BVH", npz: "NPZ", glb: "GLB", mp4: "MP4", smplx: "SMPL-X" };
 const ZIPPED = ["bvh", "glb", "npz"];
 
-let about = null, takes = [], reuse = () => {}, mine = new Set(), waitingFilms = new Set();
+let about = null, takes = [], reuse = () => {}, mine = new Set(), waitingFilms = new Set(), first = true;
 const orders = new Map(), drawn = new Map(), failed = new Map();
 
 export function beginTakes(facts, onReuse) {
@@ -25,7 +25,6 @@ export function expect(take) {
 }
 
 export function update(state) {
-  const before = new Map(takes.map((take) => [take.id, take]));
   takes = state.takes;
   keepOnly(new Set(takes.map((take) => take.id)));
   draw();
@@ -42,7 +41,11 @@ export function update(state) {
       if (job.state === "done") download(`api/takes/${key}`);
     }
   }
-  return before;
+  find("welcome-title").textContent = takes.some((take) => !ENDED.includes(take.job.state)) ? "One moment." : "Press Generate.";
+  // A page that is opened again shows the newest take.
+  const newest = takes.find((take) => take.job.state === "done");
+  if (first && newest && !shownSamples().length) showTake(newest);
+  first = false;
 }
 
 const cardOf = (take) => find("takes").querySelector(`[data-take="${take.id}"]`);
