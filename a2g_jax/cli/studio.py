@@ -156,6 +156,8 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
     about = {**ready.about}
     label, lanes = about.pop("label", ""), about.pop("lanes", ())
     job.say("generating")
+    # Where 'a2g generate' orders samples by a score, the page offers that order.
+    order = {"order": "best"} if "order" in vars(options) else {}
     export(
         ready.run,
         checked,
@@ -168,6 +170,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         label=label,
         report=lambda done: job.step(done, options.samples, "sample"),
         delivery=ready.delivery,
+        **order,
     )
     write_audio(folder / SPEECH, ready.audio, rate)
     described = [describe_findings(report.findings, ready.run.config.fps) for report in checked.reports]
@@ -177,8 +180,17 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         lanes=tuple(lanes),
         notes=tuple(note for note, _ in described),
         tracks=tuple(tracks for _, tracks in described),
+        scores=_scores(folder),
         lines=(*ready.lines, *checked.lines(), *ready.report(folder)),
     )
+
+
+def _scores(folder: Path) -> tuple[float, ...]:
+    """The scores of the samples by number; empty where they have none."""
+    from a2g_jax.io.files import read_json
+
+    rows = read_json(folder / "checks.json").get("scores", ())
+    return tuple(float(row["score"]) for row in sorted(rows, key=lambda row: row["sample"]))
 
 
 def _opened(name: str) -> "Run":

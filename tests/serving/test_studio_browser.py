@@ -6,6 +6,12 @@ from pathlib import Path
 
 import pytest
 
+# Modules that threads of the studio import later: with the import hook of the tests, CPython 3.11 parses in one thread.
+import a2g_jax.generation.clips
+import a2g_jax.generation.export
+import a2g_jax.inspection.audio_checks
+import a2g_jax.training.run
+import a2g_jax.viz.player.video  # noqa: F401
 from a2g_jax.cli.studio import add_demo_speech, make_studio, named_runs
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import read_bvh, write_bvh
@@ -157,7 +163,7 @@ def test_nothing_overflows_and_targets_are_large(page, width):
         part.click()
     assert page.evaluate("document.documentElement.scrollWidth") == width
     small = page.evaluate(
-        """[...document.querySelectorAll("form button, form .button, form select, form input:not(.hidden), form summary")]
+        """[...document.querySelectorAll("form :is(button, .button, select, input:not(.hidden), summary)")]
         .filter((one) => one.offsetParent && one.type !== "checkbox" && (one.offsetHeight < 44 || one.offsetWidth < 44))
         .map((one) => one.outerHTML)"""
     )

@@ -113,7 +113,8 @@ def read_request(
         formats = f"{character_suffix(rig).removeprefix('.')},npz"
     if changed := values.get("settings"):
         arguments += _settings(changed, settings(system))
-    shown = shlex.join(["a2g", "generate", *(named(one, used) for one in arguments), "--out=gestures"])
+    sent = [upload for upload in used if not upload.keep]
+    shown = shlex.join(["a2g", "generate", *(named(one, sent) for one in arguments), "--out=gestures"])
     return Request(
         system, used[0], samples, (*arguments, f"--formats={formats}"), shown, tuple(used), character=rig is not None
     )

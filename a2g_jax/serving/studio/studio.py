@@ -18,7 +18,7 @@ from a2g_jax.io.temporary import remove, temporary_path
 from a2g_jax.io.words import Word
 from a2g_jax.serving.studio.jobs import DONE, Job, Jobs
 from a2g_jax.serving.studio.readers import KINDS
-from a2g_jax.serving.studio.settings import MOST_SAMPLES, field_of, named, read_request
+from a2g_jax.serving.studio.settings import MOST_SAMPLES, Request, field_of, named, read_request
 from a2g_jax.serving.studio.takes import (
     MOST_STARS,
     Generate,
@@ -66,7 +66,7 @@ class Studio:
         self._made = 0
         self._pace: dict[str, float] = {}
         self._described: dict[str, Capabilities] = {}
-        self._describing = threading.Lock()
+        self._describing, self._requesting = threading.Lock(), threading.Lock()
         self._words: dict[str, Sequence[Word]] = {}
         self._changes = 0
 
@@ -131,6 +131,7 @@ class Studio:
             "formats": list(formats()),
             "slow": {name: self._missing.get(name, "") for name in slow_formats()},
             "accept": {name: ",".join(kind.suffixes) for name, kind in self._kinds.items()},
+            "most_bytes": {name: kind.most_bytes for name, kind in self._kinds.items()},
             "most_samples": MOST_SAMPLES,
             "most_stars": MOST_STARS,
         }
@@ -149,6 +150,10 @@ class Studio:
             InputError: too many requests wait.
         """
         request = read_request(values, self.systems, self.uploads, self._settings_of)
+        with self._requesting:
+            return self._submit(request, values)
+
+    def _submit(self, request: Request, values: Any) -> Take:
         folder = self.folder / f"take-{secrets.token_hex(8)}"
         seconds = float(request.speech.about.get("seconds", 0.0))
         pace = self._pace.get(request.system)
@@ -274,7 +279,7 @@ class Studio:
 
     def state(self) -> dict[str, Any]:
         """All takes, the newest first."""
-        takes = sorted(self.takes.values(), key=lambda take: -take.number)
+        takes = sorted(list(self.takes.values()), key=lambda take: -take.number)
         return {"takes": [take.to_json(self.jobs.position(take.job)) for take in takes]}
 
     @property
@@ -284,11 +289,11 @@ class Studio:
 
     def make_room_for_files(self) -> None:
         """Remove the oldest uploads over the limits that no waiting request names."""
-        used = [upload.path for take in self.takes.values() if take.busy for upload in take.request.used]
+        used = [upload.path for take in list(self.takes.values()) if take.busy for upload in take.request.used]
         self.uploads.drop_oldest(used)
 
     def _make_room(self) -> None:
-        ended = [take for take in self.takes.values() if not take.busy]
+        ended = [take for take in list(self.takes.values()) if not take.busy]
         for take in sorted(ended, key=lambda take: (any(take.stars.values()), take.number)):
             if len(self.takes) < self._most:
                 return

@@ -30,8 +30,12 @@ export const get = (path) => call("GET", path);
 export const post = (path, body) => call("POST", path, body);
 export const remove = (path) => call("DELETE", path);
 
+const limits = {};
+export const setLimits = (bytes) => Object.assign(limits, bytes);
+
 // Sends a file; `progress` gets the share that has arrived.
 export function upload(kind, file, name, progress = () => {}) {
+  if (file.size > limits[kind]) return Promise.reject(new Refused(`${name} is larger than ${Math.round(limits[kind] / 1e6)} MB, the most that is taken; cut it first.`));
   return new Promise((done, fail) => {
     const request = new XMLHttpRequest();
     request.open("POST", `api/uploads/${kind}`);

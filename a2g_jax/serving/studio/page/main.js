@@ -1,6 +1,6 @@
 // The studio: the form on the left, the player and the takes on the right.
 
-import { follow, get } from "./api.js";
+import { follow, get, setLimits } from "./api.js";
 import { find, showError } from "./dom.js";
 import { addPin, beginForm, reuse } from "./form.js";
 import { takeSpeech } from "./speech.js";
@@ -25,6 +25,7 @@ function attachDrop(about) {
 
 async function begin() {
   const about = await get("api/about");
+  setLimits(about.most_bytes);
   beginTakes(about, reuse);
   follow(update, (connected) => { document.body.classList.toggle("lost", !connected); });
   attachDrop(about);
