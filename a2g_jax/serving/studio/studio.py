@@ -279,7 +279,8 @@ class Studio:
 
     def state(self) -> dict[str, Any]:
         """All takes, the newest first."""
-        takes = sorted(list(self.takes.values()), key=lambda take: -take.number)
+        takes = list(self.takes.values())  # requests arrive in other threads
+        takes.sort(key=lambda take: -take.number)
         return {"takes": [take.to_json(self.jobs.position(take.job)) for take in takes]}
 
     @property

@@ -61,13 +61,30 @@ const showTake = (take) => show(sortedSamples(take).map((sample) => ({ take: tak
 
 // --- cards ---
 
+// A take without what changes all the time while it is worked on.
+function lasting(take) {
+  const still = (job) => [job.state, job.error];
+  const samples = take.samples?.map((sample) => ({ ...sample, films: Object.entries(sample.films).map(([format, job]) => [format, still(job)]) }));
+  return { ...take, job: still(take.job), samples };
+}
+
+// Progress is written into the cards as they are: a button that is being pressed must not be replaced.
+function refresh(card, take) {
+  const bar = card.querySelector("progress");
+  if (bar) fill(bar, bar.nextElementSibling, take.job);
+  for (const sample of take.samples || []) for (const [format, job] of Object.entries(sample.films)) {
+    const button = card.querySelector(`[data-film="${sample.number}/${format}"]`);
+    if (button) button.textContent = `${nameOf(format)} ${filmWords(job)} ×`;
+  }
+}
+
 // Cards that changed are drawn again; the focus stays on the same button.
 function draw(all = false) {
   const list = find("takes"), focused = document.activeElement?.dataset?.key;
   const cards = takes.map((take) => {
-    const text = JSON.stringify([take, orders.get(take.id), failed.get(take.id)]);
+    const text = JSON.stringify([lasting(take), orders.get(take.id), failed.get(take.id)]);
     const old = drawn.get(take.id);
-    if (old && old.text === text && !all) return old.card;
+    if (old && old.text === text && !all) { refresh(old.card, take); return old.card; }
     const card = makeCard(take);
     drawn.set(take.id, { text, card });
     return card;
@@ -108,9 +125,16 @@ function detail(take) {
 }
 
 function progress(job, cancel, key) {
-  const bar = make("progress", { max: Math.max(job.total, 1), value: job.state === "queued" || (job.done === 0 && job.remaining === null) ? null : shareOf(job), "aria-label": job.title });
-  return make("div", { class: "line progress" }, bar, make("span", { class: "soft", role: "status" }, wordsOf(job)),
+  const bar = make("progress", { "aria-label": job.title }), words = make("span", { class: "soft" });
+  fill(bar, words, job);
+  return make("div", { class: "line progress" }, bar, words,
     make("button", { type: "button", "data-key": key, disabled: job.state === "stopping", onclick: cancel }, "Cancel"));
+}
+
+function fill(bar, words, job) {
+  bar.max = Math.max(job.total, 1);
+  if (job.state === "queued" || (job.done === 0 && job.remaining === null)) bar.removeAttribute("value"); else bar.value = shareOf(job);
+  if (words.textContent !== wordsOf(job)) words.textContent = wordsOf(job);
 }
 
 // Where one step takes long, the estimate moves the bar between steps.
@@ -146,14 +170,20 @@ function stars(take, sample) {
   }));
 }
 
+const nameOf = (format) => NAMES[format] || format.toUpperCase();
+
+function filmWords(job) {
+  if (job.state !== "running") return job.state === "queued" ? "waits" : "stops…";
+  return job.total ? `${Math.floor(100 * job.done / job.total)} %${job.remaining ? `, ${duration(job.remaining)}` : ""}` : "begins…";
+}
+
 function file(take, sample, format) {
-  const name = NAMES[format] || format.toUpperCase(), path = `${take.id}/files/${sample.number}/${format}`, key = `file-${path}`;
+  const name = nameOf(format), path = `${take.id}/files/${sample.number}/${format}`, key = `file-${path}`;
   if (!(format in about.slow)) return make("a", { class: "button", href: `api/takes/${path}`, download: "", "data-key": key, title: `Download sample ${sample.number} as ${name}` }, name);
   const job = sample.films[format];
   if (job && job.state === "done") return make("a", { class: "button ready", href: `api/takes/${path}`, download: "", "data-key": key, title: `Download sample ${sample.number} as ${name}` }, name);
   if (job && !ENDED.includes(job.state)) {
-    const words = job.state === "running" && job.total ? `${Math.floor(100 * job.done / job.total)} %${job.remaining ? `, ${duration(job.remaining)}` : ""}` : job.state === "running" ? "begins…" : job.state === "queued" ? "waits" : "stops…";
-    return make("button", { type: "button", class: "busy", "data-key": key, title: "Press to cancel", "aria-label": `${name}: ${words}; press to cancel`, onclick: () => act(take, post(`api/takes/${take.id}/films/${sample.number}/${format}/cancel`)) }, `${name} ${words} ×`);
+    return make("button", { type: "button", class: "busy", "data-key": key, "data-film": `${sample.number}/${format}`, title: "Press to cancel", onclick: () => act(take, post(`api/takes/${take.id}/films/${sample.number}/${format}/cancel`)) }, `${name} ${filmWords(job)} ×`);
   }
   const missing = about.slow[format], why = job?.state === "failed" ? job.error.message : missing;
   return make("button", { type: "button", disabled: Boolean(missing), "data-key": key, title: why || `Make a film of sample ${sample.number}`, onclick: () => { waitingFilms.add(path); act(take, post(`api/takes/${take.id}/films/${sample.number}/${format}`)); } }, name);
