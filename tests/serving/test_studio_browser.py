@@ -4,6 +4,7 @@ import base64
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 # Modules that threads of the studio import later: with the import hook of the tests, CPython 3.11 parses in one thread.
@@ -84,6 +85,7 @@ def page(browser, url):
 def talked(tmp_path_factory):
     folder, recording = tmp_path_factory.mktemp("speech"), talk(SECONDS, 4)
     write_audio(folder / "talk.wav", recording.audio, 16000)
+    write_audio(folder / "long.wav", np.tile(recording.audio, 120), 16000)
     write_bvh(folder / "wave.bvh", recording.motion)
     (folder / "junk.wav").write_bytes(b"no sound")
     return folder
@@ -102,12 +104,12 @@ def test_speech_is_dropped_and_its_gestures_are_seen_ranked_and_downloaded(page,
     page.locator("#generate").click()
     page.locator(".take.done").wait_for()
 
-    # A second request for the speech of the demo is cancelled while it runs or waits.
-    page.locator("#use-demo").click()
+    # A second request, for four minutes of speech, is cancelled while it is worked on.
+    drop(page, talked / "long.wav")
+    page.locator("#speech-name", has_text="long.wav").wait_for()
     page.locator("#samples").fill("12")
     page.locator("#generate").click()
-    cancelled = page.locator(".take").first
-    cancelled.locator("button", has_text="Cancel").click()
+    page.locator(".take.card button", has_text="Cancel").press("Enter")
     page.locator(".take.cancelled").wait_for()
     assert not studio.busy
     assert len(list(studio.folder.glob("take-*"))) == 1

@@ -6,7 +6,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +18,7 @@ from a2g_jax.io.temporary import remove, temporary_path
 from a2g_jax.io.words import Word
 from a2g_jax.serving.studio.jobs import DONE, Job, Jobs
 from a2g_jax.serving.studio.readers import KINDS
-from a2g_jax.serving.studio.settings import MOST_SAMPLES, Request, field_of, named, read_request
+from a2g_jax.serving.studio.settings import MOST_SAMPLES, Request, field_of, read_request
 from a2g_jax.serving.studio.takes import (
     MOST_STARS,
     Generate,
@@ -28,9 +28,9 @@ from a2g_jax.serving.studio.takes import (
     missing_programs,
     slow_formats,
     takes_page,
+    with_client_names,
 )
 from a2g_jax.serving.studio.uploads import Kind, Upload, Uploads
-from a2g_jax.viz.player import Track
 
 #: Takes that are kept; the oldest without stars make room, then the oldest.
 MOST_TAKES = 24
@@ -300,15 +300,3 @@ class Studio:
                 return
             del self.takes[take.id]
             shutil.rmtree(take.folder, ignore_errors=True)
-
-
-def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:
-    """The texts of an outcome with the names that the client has for its files."""
-    lanes = tuple(
-        replace(lane, spans=tuple((*span[:2], named(span[2], used), *span[3:]) for span in lane.spans))
-        if isinstance(lane, Track)
-        else lane
-        for lane in outcome.lanes
-    )
-    lines = tuple(named(line, used) for line in outcome.lines)
-    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines)

@@ -4,7 +4,7 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,9 @@ from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.io.words import Word
 from a2g_jax.plugins import load_object
 from a2g_jax.serving.studio.jobs import DONE, ENDED, Job
-from a2g_jax.serving.studio.settings import Request
-from a2g_jax.viz.player import Figure, Lane
+from a2g_jax.serving.studio.settings import Request, named
+from a2g_jax.serving.studio.uploads import Upload
+from a2g_jax.viz.player import Figure, Lane, Track
 from a2g_jax.viz.player.page import page_html
 
 #: The speech of a take, in its folder.
@@ -270,3 +271,15 @@ def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
         words=first.words,
         lanes=[lane for take in takes for lane in take.outcome.lanes],
     )
+
+
+def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:
+    """The texts of an outcome with the names that the client has for its files."""
+    lanes = tuple(
+        replace(lane, spans=tuple((*span[:2], named(span[2], used), *span[3:]) for span in lane.spans))
+        if isinstance(lane, Track)
+        else lane
+        for lane in outcome.lanes
+    )
+    lines = tuple(named(line, used) for line in outcome.lines)
+    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines)

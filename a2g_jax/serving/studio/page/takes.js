@@ -63,7 +63,7 @@ const showTake = (take) => show(sortedSamples(take).map((sample) => ({ take: tak
 
 // A take without what changes all the time while it is worked on.
 function lasting(take) {
-  const still = (job) => [job.state, job.error];
+  const still = (job) => [job.state === "queued" ? "running" : job.state, job.error];
   const samples = take.samples?.map((sample) => ({ ...sample, films: Object.entries(sample.films).map(([format, job]) => [format, still(job)]) }));
   return { ...take, job: still(take.job), samples };
 }
