@@ -111,7 +111,7 @@ def check_needs(before: Any, after: Any, model: Mapping[str, Any]) -> None:
 
 def settings_lines(settings: Any) -> list[str]:
     """The flag, value and description of each setting, as ``--settings`` prints them."""
-    about = _descriptions(type(settings))
+    about = describe_settings(type(settings))
     lines = []
     for field in fields(settings):
         value = getattr(settings, field.name)
@@ -121,8 +121,8 @@ def settings_lines(settings: Any) -> list[str]:
     return lines
 
 
-def _descriptions(cls: type) -> dict[str, str]:
-    """The first paragraph of the docstring below each field, where the source is available."""
+def describe_settings(cls: type) -> dict[str, str]:
+    """The first paragraph of the docstring below each field of a dataclass, where the source is available."""
     try:
         (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
     except (OSError, SyntaxError, ValueError):

@@ -1,8 +1,12 @@
-"""Progress on standard error: a bar in a terminal, a line every ten seconds in a log file."""
+"""Progress on standard error: a bar in a terminal, a line every ten seconds in a log file; checkpoints of long work.
+
+A server that runs the work has no terminal, and has to stop it on request: it watches the checkpoints.
+"""
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeVar
 
 from tqdm import tqdm
@@ -28,3 +32,30 @@ def counted(items: Iterable[Item], bar: tqdm) -> Iterator[Item]:
 def say(line: str) -> None:
     """Print a line for the user without breaking a bar."""
     tqdm.write(line, file=sys.stderr)
+
+
+#: Called at checkpoints: steps done, their number, and their unit; both are 0 where only an interruption is possible.
+Watcher = Callable[[int, int, str], None]
+_watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+
+
+@contextmanager
+def watched(watcher: Watcher) -> Iterator[None]:
+    """Calls a function at the checkpoints of the block, in this thread alone; what it raises ends the work there."""
+    token = _watcher.set(watcher)
+    try:
+        yield
+    finally:
+        _watcher.reset(token)
+
+
+def checkpoint(done: int = 0, total: int = 0, unit: str = "") -> None:
+    """A place in long work at which it can be interrupted and its progress shown.
+
+    Args:
+        done: steps done of ``total``; 0 of 0 where these are not counted.
+        unit: of a step, such as ``frame``.
+    """
+    watcher = _watcher.get()
+    if watcher is not None:
+        watcher(done, total, unit)

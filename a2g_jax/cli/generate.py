@@ -1,8 +1,10 @@
 """``a2g generate``: motions for a speech with a trained run."""
 
 import argparse
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from a2g_jax.cli import characters, clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
@@ -10,6 +12,10 @@ from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
 from a2g_jax.cli.speech import read_speech, read_words
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from a2g_jax.generation.delivery import Delivery
+    from a2g_jax.training.run import Run
 
 DESCRIPTION = (
     "Generate motions for a speech with a trained run. Every setting of the model's generation is a flag too, such as"
@@ -56,33 +62,83 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     for name in ("audio", "out"):
         if getattr(options, name) is None:
             raise InputError(f"--{name} is needed (see 'a2g generate --help').")
+    check(options, extra)
+    writable_folder(options.out)
+
+    from a2g_jax.compilations import keep_compilations
+
+    keep_compilations()
+    ready = prepare(options, settings)
+    for line in ready.lines:
+        print(line)
+    sampling.write_samples(
+        ready.run, ready.chosen.sampler, ready.audio, options, ready.title, delivery=ready.delivery, **ready.about
+    )
+    for line in ready.report(Path(options.out)):
+        print(line)
+
+
+def check(options: argparse.Namespace, extra: Sequence[str] = ()) -> None:
+    """Refuse flags that do not fit each other and files that do not exist; set ``options.formats`` where none were
+    requested. Nothing heavy is imported.
+
+    Args:
+        extra: flags of sampling settings.
+
+    Raises:
+        InputError: such a flag or file.
+    """
     clips.check_flags(options, extra)
     existing_file(options.audio)
     characters.check(options)
     sampling.check_transcript(options)  # after the formats are settled
     clips.check_files(options)
-    writable_folder(options.out)
 
-    from a2g_jax.compilations import keep_compilations
+
+@dataclass(frozen=True, eq=False)
+class Ready:
+    """A request that is ready to generate."""
+
+    run: "Run"
+    """With the sampling settings of the request."""
+    chosen: clips.Chosen
+    audio: Any
+    """(N,), mono, at the run's sample rate."""
+    title: str
+    """Of the speech."""
+    delivery: "Delivery"
+    about: dict[str, Any] = field(default_factory=dict)
+    """Further arguments of :func:`~a2g_jax.generation.export.export`: label, words and lanes."""
+    lines: tuple[str, ...] = ()
+    """What is known before the work, for the user."""
+
+    def report(self, out: Path) -> list[str]:
+        """Write reports to the output folder after the motions; the lines to print."""
+        return [*self.delivery.lines(), *self.chosen.report(out)]
+
+
+def prepare(options: argparse.Namespace, settings: Any, opened: "Run | None" = None) -> Ready:
+    """Read everything that a request names: the run, the speech, its words, clips and the character.
+
+    Args:
+        options: checked with :func:`check`.
+        settings: sampling settings, of :func:`a2g_jax.cli.sampling.sampling_settings`.
+        opened: the run, where it is open already.
+
+    Raises:
+        InputError: a run, audio, clip or character that cannot be used.
+    """
     from a2g_jax.training.run import open_run
 
-    keep_compilations()
     delivery = characters.delivery(options)
-    opened = open_run(options.run)
+    opened = open_run(options.run) if opened is None else opened
     trained = replace(opened, config=replace(opened.config, sampling=settings))
     _ = trained.config.skeleton  # a run on poses without one is refused before any work
-    for line in characters.lines(delivery, trained):
-        print(line)
+    lines = tuple(characters.lines(delivery, trained))
     rate = trained.config.mel.sample_rate
     audio = read_speech(options.audio, options.channel).at(rate)
     words = read_words(options.transcript, options.tier, len(audio) / rate)
     chosen = clips.sampler_of(trained, audio, options)
     parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))
     about = {**chosen.about, "label": ", ".join(part for part in parts if part), "words": words}
-    sampling.write_samples(
-        trained, chosen.sampler, audio, options, Path(options.audio).name, delivery=delivery, **about
-    )
-    for line in delivery.lines():
-        print(line)
-    for line in chosen.report(Path(options.out)):
-        print(line)
+    return Ready(trained, chosen, audio, Path(options.audio).name, delivery, about, lines)

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
-from a2g_jax.cli import demo, evaluate, export, generate, inspect, label, prepare, retarget, serve, talk, train
+from a2g_jax.cli import demo, evaluate, export, generate, inspect, label, prepare, retarget, serve, studio, talk, train
 from a2g_jax.errors import A2GError, InputWarning, Interrupted
 
 #: The module of each command: ``DESCRIPTION``, ``add_arguments(parser)`` and ``run(options, extra)``, which returns
@@ -26,6 +26,7 @@ COMMANDS: dict[str, ModuleType] = {
     "evaluate": evaluate,
     "retarget": retarget,
     "serve": serve,
+    "studio": studio,
 }
 
 

@@ -14,6 +14,7 @@ from a2g_jax.generation.generator import Audio, Sampler
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.metrics.body.bounds import BodyBounds
 from a2g_jax.metrics.body.check import BodyFinding, Stretch, check_motion, frames_outside
+from a2g_jax.progress import checkpoint
 from a2g_jax.training.run import Run
 
 #: Draws in place of a bad one. If a fifth of the samples is bad, one in 600 is still bad after three more.
@@ -133,6 +134,7 @@ class Checked:
         first = check_motion(draft.motion, self.bounds, self.stretches)
         kept, draws = self._eased(draft, first), 1
         while kept.findings and draws <= REDRAWS and self._helps(kept.findings):
+            checkpoint()
             (again,) = drafts_of(self.sampler, audio, 1, redrawn_seed(seed, sample, draws))
             draws += 1
             if _same(again.motion, draft.motion):

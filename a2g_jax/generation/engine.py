@@ -11,8 +11,9 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import check_rows, check_stored, stored_rows
-from a2g_jax.models.base import Condition
+from a2g_jax.models.base import Condition, Model
 from a2g_jax.nn.blocks import BLOCK
+from a2g_jax.progress import checkpoint
 from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
@@ -24,6 +25,18 @@ WINDOW = 1024
 LANES = 4
 #: Fields of a condition with a row for each frame.
 _BY_FRAME = ("emotion", "words", "controls", "latents")
+
+
+def check_generates(run: Run) -> Model:
+    """The model of a run.
+
+    Raises:
+        InputError: it does not generate motion from audio.
+    """
+    model = run.config.build()
+    if model.condition is None or model.sample is None:
+        raise InputError(f"{run.config.model}: generates no motion from audio; name a run of a model that does.")
+    return model
 
 
 class Engine:
@@ -42,9 +55,9 @@ class Engine:
             InputError: the run's model does not generate motion from audio.
         """
         self.run, self.window = run, window
-        model = self.model = run.config.build()
-        if model.condition is None or model.sample is None:
-            raise InputError(f"{run.config.model}: generates no motion from audio; name a run of a model that does.")
+        model = self.model = check_generates(run)
+        assert model.condition is not None
+        assert model.sample is not None
         self.halo = -(-model.halo // BLOCK) * BLOCK
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
@@ -99,8 +112,11 @@ class Engine:
         conditions = list(windows)
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
-            parts = [draw(condition, jnp.int32(start)) for start, condition in conditions]
-            yield self.run.finished(np.concatenate([np.asarray(part) for part in parts])[:frames])
+            parts = []
+            for start, condition in conditions:
+                checkpoint()
+                parts.append(np.asarray(draw(condition, jnp.int32(start))))
+            yield self.run.finished(np.concatenate(parts)[:frames])
 
     def _check(self, given: Condition) -> None:
         for name, value in given._asdict().items():
@@ -138,6 +154,7 @@ class Engine:
             keys = jax.vmap(lambda number: jax.random.fold_in(key, number))(first + jnp.arange(LANES))
             state, parts = self._begin(self._params, self._summary, keys, seeds), []
             for start, condition in windows:
+                checkpoint()
                 pose, state = self._advance(self._params, self._summary, keys, condition, jnp.int32(start), state)
                 parts.append(np.asarray(pose))
             yield from map(self.run.finished, np.concatenate(parts, axis=1)[: samples - first, :frames])
@@ -160,6 +177,7 @@ class Engine:
         held = jax.tree.map(hold, {"emotion": given.emotion, "latents": given.latents, "controls": controls})
         words: Any = None if given.words is None else np.pad(given.words, (around,))
         for start in range(0, count * window, window):
+            checkpoint()
             rows = slice(start, start + window + 2 * halo)
             cut = Condition(
                 audio=audio[rows],

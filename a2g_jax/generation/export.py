@@ -92,7 +92,7 @@ def export(
                 audio,
                 config.mel.sample_rate,
                 title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-                subtitle=_requested(checked, samples, label),
+                subtitle=requested(checked, samples, label),
                 words=words,
                 lanes=lanes,
                 footer=f"{config.model}, {config.preset} preset, {run.steps} training steps, seed {seed}",
@@ -100,7 +100,7 @@ def export(
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def _requested(checked: Checked, samples: int, label: str) -> str:
+def requested(checked: Checked, samples: int, label: str) -> str:
     """What the page shows, and what was requested."""
     what = "The same speech, and different gestures for it" if samples > 1 else ""
     controls = " ".join(getattr(checked.run.config.sampling_settings, "controls", ()))
@@ -125,10 +125,14 @@ def checked_figure(
     """
     if not findings:
         return Figure(motion, label, note, files=files)
+    return Figure(motion, label, *describe_findings(findings, motion.fps), files)
+
+
+def describe_findings(findings: Sequence[BodyFinding], fps: float) -> tuple[str, tuple[Track, ...]]:
+    """The worst finding for the text under a figure, and a lane of all; empty without any."""
+    if not findings:
+        return "", ()
     spans = tuple(
-        (one.first / motion.fps, one.stop / motion.fps, str(one), "#c0392b")
-        for one in sorted(findings, key=lambda one: one.first)
+        (one.first / fps, one.stop / fps, str(one), "#c0392b") for one in sorted(findings, key=lambda one: one.first)
     )
-    return Figure(
-        motion, label, f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),), files
-    )
+    return f"outside the bounds of a body at {findings[0]}", (Track("outside bounds", spans),)

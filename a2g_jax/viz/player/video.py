@@ -17,6 +17,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.files import atomic_path
+from a2g_jax.progress import checkpoint
 from a2g_jax.viz.player.figure import Figure
 from a2g_jax.viz.player.page import write_page
 from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
@@ -104,8 +105,10 @@ def write_video(
             speech = Path(folder) / "speech.wav"
             write_audio(speech, sound, sample_rate)
         with _encoder(temporary, motion.fps, speech) as pictures:
-            for picture in page_pictures(page, np.arange(motion.frames) / motion.fps, script=_NEAR):
+            drawn = page_pictures(page, np.arange(motion.frames) / motion.fps, script=_NEAR)
+            for done, picture in enumerate(drawn, start=1):
                 pictures.write(picture)
+                checkpoint(done, motion.frames, "frame")
 
 
 def page_pictures(

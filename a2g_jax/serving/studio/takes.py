@@ -1,0 +1,285 @@
+"""A take: the samples of one request in a folder of its own, with their files, page and ranking."""
+
+import threading
+import zipfile
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from a2g_jax.errors import InputError
+from a2g_jax.generation.formats import PAGE, check_page_size, known_formats, motion_format
+from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.audio import read_audio
+from a2g_jax.io.files import atomic_path, json_text
+from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.io.words import Word
+from a2g_jax.plugins import load_object
+from a2g_jax.serving.studio.jobs import DONE, ENDED, Job
+from a2g_jax.serving.studio.settings import Request, named
+from a2g_jax.serving.studio.uploads import Upload
+from a2g_jax.viz.player import Figure, Lane, Track
+from a2g_jax.viz.player.page import page_html
+
+#: The speech of a take, in its folder.
+SPEECH = "speech.wav"
+#: Most stars of a sample.
+MOST_STARS = 5
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What generation wrote into a take's folder: ``sample_00.npz``, ..., ``speech.wav`` and reports."""
+
+    seconds: float
+    """Length of a motion."""
+    subtitle: str = ""
+    lanes: tuple[Lane, ...] = ()
+    """Further lanes of the page, such as the pinned clips."""
+    notes: tuple[str, ...] = ()
+    """Of each sample: what is outside the bounds of a body."""
+    tracks: tuple[tuple[Lane, ...], ...] = ()
+    """Lanes of each sample."""
+    scores: tuple[float, ...] = ()
+    """Of each sample, higher is better; none where samples have no score."""
+    lines: tuple[str, ...] = ()
+    """Reports on the whole, for the user."""
+
+
+#: Generates: the arguments of ``a2g generate``, the folder, and the job that progress is reported to.
+Generate = Callable[[Sequence[str], Path, Job], Outcome]
+
+
+@dataclass(eq=False)
+class Take:
+    """The samples of one request."""
+
+    number: int
+    request: Request
+    folder: Path
+    job: Job
+    words: Sequence[Word] = ()
+    values: Any = None
+    """The request as the page sent it, to show it again."""
+    stars: dict[int, int] = field(default_factory=dict)
+    """Ranking: 1 to 5 of samples that have some."""
+    films: dict[tuple[int, str], Job] = field(default_factory=dict)
+    """Jobs of slow formats by sample and format."""
+    _writing: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def id(self) -> str:
+        """The job's."""
+        return self.job.id
+
+    @property
+    def outcome(self) -> Outcome:
+        """Of the finished job.
+
+        Raises:
+            InputError: it has not finished.
+        """
+        if self.job.state != DONE:
+            raise InputError(f"take {self.number} is not finished; wait for it.")
+        result: Outcome = self.job.result
+        return result
+
+    @property
+    def busy(self) -> bool:
+        """Whether any of its jobs waits or runs."""
+        return any(job.state not in ENDED for job in (self.job, *self.films.values()))
+
+    def check_sample(self, sample: int) -> None:
+        """Refuse a sample that does not exist.
+
+        Raises:
+            InputError: there is no such sample, or not yet.
+        """
+        _ = self.outcome
+        if not 0 <= sample < self.request.samples:
+            raise InputError(f"take {self.number} has no sample {sample}.")
+
+    def motion(self, sample: int) -> Motion:
+        """A sample.
+
+        Raises:
+            InputError: as :meth:`check_sample`.
+        """
+        self.check_sample(sample)
+        return read_motion_npz(self.folder / f"sample_{sample:02d}.npz")
+
+    def speech(self) -> tuple[Any, int]:
+        """The speech and its sample rate, as generation used it."""
+        return read_audio(self.folder / SPEECH, SPEECH_RATE), SPEECH_RATE
+
+    def file(self, sample: int, format: str) -> Path:
+        """The file of a sample in a format, written if it is not there yet.
+
+        Raises:
+            InputError: no such format or sample.
+            OutputError: the disk is full.
+        """
+        self.check_sample(sample)
+        if format not in formats():
+            raise InputError(f"no format {format!r}; there are {', '.join(formats())}.")
+        found = motion_format(format)
+        assert found is not None
+        path = self.folder / f"sample_{sample:02d}{found.suffix}"
+        # Slow ones are written by the one worker, and must not keep the others waiting.
+        with nullcontext() if found.check else self._writing:
+            if not path.exists():
+                found.write(path, self.motion(sample), self.speech() if found.sound else None)
+        return path
+
+    def file_name(self, sample: int, format: str) -> str:
+        """The name that a downloaded file gets."""
+        found = motion_format(format)
+        return f"take{self.number}_sample{sample}{'' if found is None else found.suffix}"
+
+    def figure(self, sample: int, label: str = "") -> Figure:
+        """A sample on the page."""
+        outcome = self.outcome
+        note = outcome.notes[sample] if sample < len(outcome.notes) else ""
+        tracks = outcome.tracks[sample] if sample < len(outcome.tracks) else ()
+        return Figure(self.motion(sample), label or f"sample {sample}", note, tracks)
+
+    def order(self, by: str = "made") -> list[int]:
+        """Samples in an order: ``made``, ``stars`` or ``score``, the best first."""
+        samples = list(range(self.request.samples))
+        scores = self.outcome.scores
+        if by == "stars":
+            return sorted(samples, key=lambda sample: -self.stars.get(sample, 0))
+        if by == "score" and len(scores) == len(samples):
+            return sorted(samples, key=lambda sample: -scores[sample])
+        return samples
+
+    def write_zip(self, path: Path, chosen: Sequence[str]) -> None:
+        """All samples in some formats, the speech and the ranking as one archive, the samples with most stars first.
+
+        Raises:
+            InputError: no such format, or one that is slow to write and not there yet.
+            OutputError: the disk is full.
+        """
+        with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.write(self.folder / SPEECH, SPEECH)
+            for sample in self.order("stars"):
+                for format in chosen:
+                    if format in slow_formats() and not self._there(sample, format):
+                        continue
+                    archive.write(self.file(sample, format), self.file_name(sample, format))
+            archive.writestr("take.json", json_text(self.summary()))
+            for report in self.folder.glob("*.json"):
+                archive.write(report, report.name)
+
+    def summary(self) -> dict[str, Any]:
+        """What the archive tells about the take."""
+        return {
+            "command": self.request.command,
+            "stars": {str(sample): stars for sample, stars in sorted(self.stars.items())},
+            "scores": list(self.outcome.scores),
+        }
+
+    def to_json(self, position: int = 0) -> dict[str, Any]:
+        """The take as JSON values.
+
+        Args:
+            position: jobs before it in the queue.
+        """
+        found = {
+            "id": self.id,
+            "number": self.number,
+            "system": self.request.system,
+            "speech": {"id": self.request.speech.id, "name": self.request.speech.name},
+            "count": self.request.samples,
+            "command": self.request.command,
+            "request": self.values,
+            "job": {**self.job.to_json(), "position": position},
+        }
+        if self.job.state != DONE:
+            return found
+        outcome = self.outcome
+        samples = [
+            {
+                "number": sample,
+                "note": outcome.notes[sample] if sample < len(outcome.notes) else "",
+                "stars": self.stars.get(sample, 0),
+                "score": outcome.scores[sample] if sample < len(outcome.scores) else None,
+                "films": {format: job.to_json() for (of, format), job in sorted(self.films.items()) if of == sample},
+            }
+            for sample in range(self.request.samples)
+        ]
+        about = {"seconds": outcome.seconds, "subtitle": outcome.subtitle, "lines": list(outcome.lines)}
+        return {**found, **about, "samples": samples}
+
+    def _there(self, sample: int, format: str) -> bool:
+        found = motion_format(format)
+        return found is not None and (self.folder / f"sample_{sample:02d}{found.suffix}").exists()
+
+
+#: Sample rate of a take's speech, Hz: that of the models.
+SPEECH_RATE = 16_000
+
+
+def formats() -> tuple[str, ...]:
+    """Formats of a sample's files."""
+    return tuple(name for name in known_formats() if name != PAGE)
+
+
+def slow_formats() -> tuple[str, ...]:
+    """Formats that other programs write, which takes minutes: they are jobs."""
+    return tuple(name for name in formats() if (found := motion_format(name)) is not None and found.check)
+
+
+def missing_programs() -> dict[str, str]:
+    """Why formats cannot be written here, by format."""
+    reasons = {}
+    for name in slow_formats():
+        found = motion_format(name)
+        assert found is not None
+        try:
+            load_object(found.check, "check")()
+        except InputError as error:
+            reasons[name] = str(error)
+    return reasons
+
+
+def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
+    """The page of samples side by side, of one take or several of the same speech: that of ``a2g generate``.
+
+    Raises:
+        InputError: no samples, samples of different speeches, or too many for a browser.
+    """
+    chosen = list(shown)
+    if not chosen:
+        raise InputError("choose samples to look at.")
+    takes = list(dict.fromkeys(take for take, _ in chosen))
+    if len({take.request.speech.id for take in takes}) > 1:
+        raise InputError("samples of different speeches cannot be played together; choose takes of one speech.")
+    first, several = takes[0], len(takes) > 1
+    label = "take {}, sample {}" if several else "sample {1}"
+    figures = [take.figure(sample, label.format(take.number, sample)) for take, sample in chosen]
+    longest = max(figures, key=lambda figure: figure.motion.frames * figure.motion.skeleton.joints).motion
+    check_page_size(len(figures), longest.frames, longest.skeleton.joints)
+    audio, rate = first.speech()
+    return page_html(
+        figures,
+        audio,
+        rate,
+        title=title,
+        subtitle="" if several else first.outcome.subtitle,
+        words=first.words,
+        lanes=[lane for take in takes for lane in take.outcome.lanes],
+    )
+
+
+def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:
+    """The texts of an outcome with the names that the client has for its files."""
+    lanes = tuple(
+        replace(lane, spans=tuple((*span[:2], named(span[2], used), *span[3:]) for span in lane.spans))
+        if isinstance(lane, Track)
+        else lane
+        for lane in outcome.lanes
+    )
+    lines = tuple(named(line, used) for line in outcome.lines)
+    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines)
