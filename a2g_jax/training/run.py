@@ -38,6 +38,7 @@ from a2g_jax.training.run_file import (
     split_settings,
 )
 from a2g_jax.training.run_hashes import Written, read_weights, write_description, write_exchange
+from a2g_jax.training.speech_range import read_speech_range
 
 
 def save_run(folder: str | os.PathLike[str], run: Run, log: Mapping[str, Any] | None = None) -> None:
@@ -134,6 +135,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             where = f"{about}: body_extremes"
             found = extremes_from_json(values["body_extremes"], config.body_reference, where)
             config = replace(config, body_extremes=found)
+        config = replace(config, speech_range=read_speech_range(folder, config.mel))
         steps = int(values["steps"])
         gains = {
             name.removeprefix("dynamics/"): array for name, array in arrays.items() if name.startswith("dynamics/")
