@@ -56,12 +56,12 @@ def window_spectra(rows: Float[np.ndarray, "T width"], mel: MelConfig, fps: floa
     if len(spectra) < SHORTEST * rate:
         return Spectra({name: np.zeros(0) for name in found}, np.zeros((0, mel.bands)))
     size, step = min(round(WINDOW * rate), len(spectra)), round(STEP * rate)
-    loud = float(np.percentile(_level(spectra), 95))
+    loud, floor = float(np.percentile(_level(spectra), 95)), float(spectra.min())
     for start in range(0, len(spectra) - size + 1, step):
         some = spectra[start : start + size]
         level = np.maximum(_level(some) - loud, -50.0)
         active = level > -_PAUSE
-        if active.mean() < _LEAST_ACTIVE:
+        if active.mean() < _LEAST_ACTIVE or some.max() == floor:  # a pause, or digital silence
             continue
         energy = 10 ** (some / 10)
         high = energy[:, centres >= 1000.0].sum(axis=1)[active].mean()

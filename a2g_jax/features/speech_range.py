@@ -13,8 +13,8 @@ from a2g_jax.features.speech_figures import window_pitch, window_spectra
 
 #: Quantiles of the windows of the training speech between which a figure is in its range.
 QUANTILES = (0.001, 0.999)
-#: Share of the range by which a speech may lie beyond it.
-MARGIN = 0.1
+#: Share of the range by which a speech may lie beyond it; of pitch, a factor (a semitone).
+MARGIN, SEMITONE = 0.1, 2.0 ** (1 / 12)
 #: Least windows (of six seconds, every three) from which a range follows.
 LEAST_WINDOWS = 12
 
@@ -85,7 +85,8 @@ class SpeechRange:
                 continue
             (low, high), value = self.ranges[name], float(np.median(values[name]))
             slack = MARGIN * (high - low)
-            if value > high + slack or (name != "spectrum" and value < low - slack):
+            least, most = (low / SEMITONE, high * SEMITONE) if name == "pitch" else (low - slack, high + slack)
+            if value > most or (name != "spectrum" and value < least):
                 found.append(Outside(name, value, low, high))
         return tuple(found)
 

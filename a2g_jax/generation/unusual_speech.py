@@ -12,7 +12,7 @@ def unusual_speech(run: Run, audio: Any, sample_rate: int | None = None) -> tupl
 
     The figures are pitch, level variation, rate of syllables, balance and change of the spectrum, and its distance
     from the mean spectrum, each as the median over windows of six seconds; the range goes from the 0.1st to the 99.9th
-    percentile of the training speech's windows, with a margin of a tenth of its width.
+    percentile of the training speech's windows, with a margin of a tenth of its width (of pitch, a semitone).
 
     Args:
         run: without ``speech.json`` in its folder nothing is outside.

@@ -26,13 +26,15 @@ def corpus_speech_range(corpus: Corpus, config: RunConfig) -> SpeechRange | None
     other.
 
     Returns:
-        The range; None for less than about half a minute.
+        The range; None for less than about half a minute, where there is no other run.
     """
     own = _own_range(corpus)
     if config.source is None:
         return own
     before = read_speech_range(run_folder(config.source.run), config.mel)
-    return own if before is None or own is None else before.united(own)
+    if before is None or own is None:
+        return own or before
+    return before.united(own)
 
 
 def _own_range(corpus: Corpus) -> SpeechRange | None:
