@@ -42,6 +42,13 @@ def export(
     Every motion is checked, and drawn again where a body could not do it: see
     :class:`~a2g_jax.generation.checked.Checked`. ``checks.json`` has the bounds, and the findings on each sample.
 
+    Example:
+        >>> import a2g_jax
+        >>> run, audio = a2g_jax.demo_run(), a2g_jax.talk(2.0, seed=5).audio
+        >>> about = {"samples": 2, "seed": 0, "title": "two seconds", "formats": ["bvh", "html"]}
+        >>> a2g_jax.export(run, a2g_jax.Generator(run), audio, "gestures", **about)
+        {'bvh': 2, 'html': 1}
+
     Args:
         run: the sampler's.
         sampler: a ``Checked`` one is used as it is; with ``strict``, nothing is written before all samples are good.

@@ -14,6 +14,14 @@ def unusual_speech(run: Run, audio: Any, sample_rate: int | None = None) -> tupl
     from the mean spectrum, each as the median over windows of six seconds; the range goes from the 0.1st to the 99.9th
     percentile of the training speech's windows, with a margin of a tenth of its width (of pitch, a semitone).
 
+    Example:
+        >>> import a2g_jax
+        >>> run, speech = a2g_jax.demo_run(), a2g_jax.talk(8.0, seed=1).audio
+        >>> a2g_jax.unusual_speech(run, speech)
+        ()
+        >>> [one.figure for one in a2g_jax.unusual_speech(run, speech, 32000)]  # at twice its pitch
+        ['pitch']
+
     Args:
         run: without ``speech.json`` in its folder nothing is outside.
         audio: (N,), mono.

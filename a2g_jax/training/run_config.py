@@ -202,6 +202,7 @@ class RunConfig:
                 raise InputError(
                     f"{self.model}: has no sampling setting {name!r}; it has: {', '.join(names) or 'none'}."
                 )
+        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
         changed = replace(self.sampling_settings, **changes)
         check_needs(self.sampling_settings, changed, vars(self.model_config))
         return replace(self, sampling=changed)

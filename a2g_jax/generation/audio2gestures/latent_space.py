@@ -53,7 +53,15 @@ class Codes:
 
 
 class LatentSpace:
-    """Codes of speech and motion, and motion of codes; compiles once for each number of 1024-frame windows."""
+    """Codes of speech and motion, and motion of codes; compiles once for each number of 1024-frame windows.
+
+    Example:
+        >>> import a2g_jax
+        >>> space = a2g_jax.LatentSpace(a2g_jax.demo_run())
+        >>> codes = space.from_audio(a2g_jax.talk(2.0, seed=5).audio, seed=0)
+        >>> space.to_motion(space.edit(codes, "calmer")).frames
+        60
+    """
 
     def __init__(self, run: Run) -> None:
         """
