@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy import ndimage, signal
+from scipy import ndimage
 
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.mel_filters import mel_edges
 
 #: Seconds of a window, and from one window to the next.
 WINDOW, STEP = 6.0, 3.0
@@ -50,7 +51,8 @@ def window_spectra(rows: Float[np.ndarray, "T width"], mel: MelConfig, fps: floa
     """
     rate = fps * mel.stack
     spectra = np.asarray(rows, np.float64).reshape(-1, mel.bands)
-    centres = _band_centres(mel)
+    high = mel.sample_rate / 2 if mel.high_hz is None else mel.high_hz
+    treble = mel_edges(mel.bands, mel.low_hz, high)[1:-1] >= 1000.0
     found: dict[str, list[float]] = {name: [] for name in ("level", "rate", "balance", "change")}
     profiles = []
     if len(spectra) < SHORTEST * rate:
@@ -64,11 +66,11 @@ def window_spectra(rows: Float[np.ndarray, "T width"], mel: MelConfig, fps: floa
         if active.mean() < _LEAST_ACTIVE or some.max() == floor:  # a pause, or digital silence
             continue
         energy = 10 ** (some / 10)
-        high = energy[:, centres >= 1000.0].sum(axis=1)[active].mean()
-        low = energy[:, centres < 1000.0].sum(axis=1)[active].mean()
+        above = energy[:, treble].sum(axis=1)[active].mean()
+        below = energy[:, ~treble].sum(axis=1)[active].mean()
         found["level"].append(float(np.maximum(level, -40.0).std()))
         found["rate"].append(_rate(level, active, rate))
-        found["balance"].append(float(10 * np.log10(max(high, 1e-12) / max(low, 1e-12))))
+        found["balance"].append(float(10 * np.log10(max(above, 1e-12) / max(below, 1e-12))))
         found["change"].append(_change(energy, active))
         profile = some[active].mean(axis=0)
         profiles.append(profile - profile.mean())
@@ -85,6 +87,8 @@ def window_pitch(audio: Float[np.ndarray, " N"], sample_rate: int) -> Float[np.n
     """
     if len(audio) < SHORTEST * sample_rate:
         return np.zeros(0)
+    from scipy import signal  # here, since it takes half a second
+
     factor = max(1, sample_rate // 8000)  # 8 kHz is enough for pitch
     audio, rate = np.asarray(audio, np.float64), sample_rate / factor
     audio = signal.decimate(audio, factor, ftype="fir") if factor > 1 else audio
@@ -115,23 +119,13 @@ def window_pitch(audio: Float[np.ndarray, " N"], sample_rate: int) -> Float[np.n
     return np.asarray(medians)
 
 
-def _band_centres(mel: MelConfig) -> Float[np.ndarray, " bands"]:
-    """Centres of the bands on Slaney's mel scale, Hz: linear below 1 kHz, logarithmic above."""
-    top = mel.sample_rate / 2 if mel.high_hz is None else mel.high_hz
-    step = np.log(6.4) / 27.0
-
-    def to_mel(hertz: float) -> float:
-        return hertz * 3 / 200 if hertz < 1000.0 else 15.0 + float(np.log(hertz / 1000.0)) / step
-
-    points = np.linspace(to_mel(mel.low_hz), to_mel(top), mel.bands + 2)[1:-1]
-    return np.where(points < 15.0, points * 200 / 3, 1000.0 * np.exp(step * (points - 15.0)))
-
-
 def _level(spectra: Float[np.ndarray, "T bands"]) -> Float[np.ndarray, " T"]:
     return 10 * np.log10((10 ** (spectra / 10)).sum(axis=1) + 1e-12)
 
 
 def _rate(level: Float[np.ndarray, " T"], active: Bool[np.ndarray, " T"], rate: float) -> float:
+    from scipy import signal
+
     smooth = ndimage.gaussian_filter1d(level, 0.03 * rate)
     peaks, _ = signal.find_peaks(smooth, prominence=3.0)
     return float(active[peaks].sum() / max(active.sum() / rate, 1e-9))

@@ -2,20 +2,22 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.delivery import PLAIN, Delivery
 from a2g_jax.generation.formats import ORDERS, PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
-from a2g_jax.generation.ranking import Score, Scorer, best_first
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import check_folder_writable, write_json
 from a2g_jax.io.words import Word
 from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
+
+if TYPE_CHECKING:
+    from a2g_jax.generation.ranking import Score
 
 
 def export(
@@ -35,7 +37,7 @@ def export(
     sample_rate: int | None = None,
     delivery: Delivery = PLAIN,
     order: str = "number",
-    scores: list[Score] | None = None,
+    scores: "list[Score] | None" = None,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
@@ -81,7 +83,11 @@ def export(
         check_page_size(samples, frames, skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
-    scorer = Scorer(run, audio) if order == "best" else None
+    scorer = None
+    if order == "best":
+        from a2g_jax.generation.ranking import Scorer, best_first
+
+        scorer = Scorer(run, audio)
     ranked: list[Score] = []
     check_folder_writable(out)  # before any work
     if checked.strict:
@@ -104,7 +110,7 @@ def export(
                     report(done)
         finally:
             if done:  # motions before one that is refused stay, with the findings on all
-                ranked = best_first(ranked)
+                ranked = [] if scorer is None else best_first(ranked)
                 write_json(files.folder / "checks.json", checked.to_json() | _order_to_json(ranked))
         if scores is not None:
             scores[:] = ranked
@@ -124,7 +130,7 @@ def export(
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def _order_to_json(ranked: Sequence[Score]) -> dict[str, Any]:
+def _order_to_json(ranked: "Sequence[Score]") -> dict[str, Any]:
     """The order of ranked samples, and their scores; nothing where none are ranked."""
     if not ranked:
         return {}

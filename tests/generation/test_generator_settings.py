@@ -19,7 +19,8 @@ def generator(toy_run_config):
     """An untrained run of a very small model, which the noise moves."""
     config = toy_run_config()
     params = jax.device_get(config.build().init(jax.random.key(0)))
-    return Generator(Run(config, params, {}, 0), window=128)
+    codes = np.ones((3, config.model_config.code_channels), np.float32)
+    return Generator(Run(config, params, {"specific_mean": codes, "specific_std": codes}, 0), window=128)
 
 
 def test_settings_are_those_of_a_run_with_them(generator):
