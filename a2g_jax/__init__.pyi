@@ -12,8 +12,10 @@ from a2g_jax.generation.generator import Generator as Generator
 from a2g_jax.generation.live.stream import Stream as Stream
 from a2g_jax.generation.programs.loaded import Programs as Programs
 from a2g_jax.generation.programs.writing import export_programs as export_programs
+from a2g_jax.generation.ranking import rank_samples as rank_samples
 from a2g_jax.generation.stylized_flow.latent_space import FlowSpace as FlowSpace
 from a2g_jax.generation.stylized_flow.style import Style as Style
+from a2g_jax.generation.unusual_speech import unusual_speech as unusual_speech
 from a2g_jax.geometry.motion import Motion as Motion
 from a2g_jax.geometry.pose_space import PoseSpace as PoseSpace
 from a2g_jax.geometry.retarget.match import match_rigs as match_rigs

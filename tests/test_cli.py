@@ -47,6 +47,8 @@ COMMANDS = ("demo", "talk", "prepare", "train", "inspect", "evaluate", "retarget
 REFUSED_EARLY = {
     "demo --nonsense": "unknown argument --nonsense",
     "demo --audio no.wav": "no.wav: there is no such file; check the path.",
+    "demo --compare --order best": "--order: orders the samples of one run; leave it out with --compare.",
+    "demo --order worst": "argument --order: invalid choice: 'worst'",
     "demo --formats gif": "no format 'gif'; there are: bvh, npz, html",
     "talk --out o --corpus no": "no: is not a corpus (no manifest.json in it); make one with 'a2g prepare'.",
     "talk --out o --formats ,": "no format in ','",
@@ -290,6 +292,7 @@ def test_from_recordings_to_motion(capsys, tmp_path):
     other = read_motion_npz(tmp_path / "other" / "sample_00.npz")
     assert np.abs(other.rotations - motion.rotations).max() > 1e-3
     assert json.loads((tmp_path / "run" / "run.json").read_text())["steps"] == 10
+    assert not (tmp_path / "run" / "speech.json").exists()  # too little speech to have a range
 
 
 @pytest.mark.slow

@@ -17,8 +17,11 @@ from a2g_jax.training.run import demo_run
 
 
 def test_demo_writes_motions_and_a_page(tmp_path, capsys):
-    assert main(["demo", "--out", str(tmp_path / "demo"), "--samples", "3"]) == 0
-    assert "open" in capsys.readouterr().out
+    assert main(["demo", "--out", str(tmp_path / "demo"), "--samples", "3", "--order", "best"]) == 0
+    printed = capsys.readouterr()
+    assert "open" in printed.out
+    assert "best first: sample " in printed.out
+    assert "outside" not in printed.out + printed.err
     assert (tmp_path / "demo" / "index.html").stat().st_size > 100_000
     motions = [read_bvh(path) for path in sorted((tmp_path / "demo").glob("*.bvh"))]
     assert [motion.frames for motion in motions] == [600, 600, 600]

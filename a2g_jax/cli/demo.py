@@ -8,7 +8,7 @@ from typing import Any
 from a2g_jax.cli import sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
-from a2g_jax.cli.speech import read_speech, read_words
+from a2g_jax.cli.speech import read_speech, read_words, warn_of_range
 from a2g_jax.errors import InputError
 
 DESCRIPTION = "Several motions for a speech, and a page to look at, with the weights that come with the package."
@@ -73,6 +73,8 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         "--compare": ("comparison", COMPARED_SAMPLES, _compare),
         "--emotions": ("emotions", EMOTION_SAMPLES, _emotions),
     }.get("".join(chosen), ("demo", sampling.SAMPLES, _demo))
+    if options.order != "number" and page != "demo":
+        raise InputError(f"--order: orders the samples of one run; leave it out with {chosen[0]}.")
     options.out = options.out or page
     options.samples = options.samples or samples
     writable_folder(options.out)
@@ -104,6 +106,8 @@ def _demo(options: argparse.Namespace) -> None:
     if options.audio is not None:
         rate = MelConfig().sample_rate
         audio, title = read_speech(options.audio, options.channel).at(rate), Path(options.audio).name
+        if not options.train:
+            warn_of_range(shipped, "demo", audio, options.audio)
         words = read_words(options.transcript, options.tier, len(audio) / rate)
     else:
         speech = demo_speech()

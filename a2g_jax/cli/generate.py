@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from a2g_jax.cli import characters, clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
-from a2g_jax.cli.speech import read_speech, read_words
+from a2g_jax.cli.speech import read_speech, read_words, warn_of_range
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
 
@@ -137,6 +137,7 @@ def prepare(options: argparse.Namespace, settings: Any, opened: "Run | None" = N
     lines = tuple(characters.lines(delivery, trained))
     rate = trained.config.mel.sample_rate
     audio = read_speech(options.audio, options.channel).at(rate)
+    warn_of_range(trained, options.run, audio, options.audio)
     words = read_words(options.transcript, options.tier, len(audio) / rate)
     chosen = clips.sampler_of(trained, audio, options)
     parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))

@@ -9,7 +9,7 @@ from a2g_jax.cli.argument_types import TIER, count, formats, seed
 from a2g_jax.cli.paths import existing_file
 from a2g_jax.config import check_needs, from_json, parse_flags
 from a2g_jax.errors import InputError
-from a2g_jax.generation.formats import PAGE, format_names, known_formats
+from a2g_jax.generation.formats import ORDERS, PAGE, format_names, known_formats
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.training.run_file import RUN_FILE, read_description, run_folder, split_settings
 
@@ -61,6 +61,13 @@ def add_arguments(
         action="store_true",
         help="an error, and no files, if a motion stays outside the bounds of a body after three more draws"
         " (default: it is reported, also in checks.json)",
+    )
+    parser.add_argument(
+        "--order",
+        choices=ORDERS,
+        default=ORDERS[0],
+        help="order of the samples on the page: by number, or best first by a score of how well strokes meet the speech"
+        " (docs/first_motion.md); files keep their names (default: number)",
     )
 
 
@@ -128,6 +135,7 @@ def write_samples(
     from a2g_jax.progress import progress_bar
 
     checked = Checked(run, sampler, strict=options.strict)
+    scores: list[Any] = []
     with progress_bar(options.samples, "generating", "motion") as bar:
         written = export(
             run,
@@ -139,11 +147,15 @@ def write_samples(
             formats=options.formats,
             title=title,
             report=lambda done: bar.update(done - bar.n),
+            order=options.order,
+            scores=scores,
             **about,
         )
     print_written(options.out, written)
     for line in checked.lines():
         print(line)
+    if scores:
+        print("best first:", ", ".join(f"sample {one.sample} ({one.score:.2f})" for one in scores))
 
 
 def print_written(out: str, written: dict[str, int]) -> None:

@@ -1,10 +1,11 @@
 """Speech and its transcript named on the command line, with warnings of what is wrong with them."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from a2g_jax.io.audio import Sound
     from a2g_jax.io.words import Word
+    from a2g_jax.training.run import Run
 
 
 def read_speech(path: str, channel: int | None) -> "Sound":
@@ -24,6 +25,23 @@ def read_speech(path: str, channel: int | None) -> "Sound":
     for finding in speech_warnings(sound):
         say(f"warning: {path}: {finding.message} {finding.fix}".rstrip())
     return sound
+
+
+def warn_of_range(run: "Run", name: str, audio: Any, path: str) -> None:
+    """Print a line if a speech lies outside what a run was trained on.
+
+    Args:
+        name: of the run.
+        audio: (N,), mono, at the run's sample rate.
+        path: of the speech.
+    """
+    from a2g_jax.generation.unusual_speech import unusual_speech
+    from a2g_jax.progress import say
+
+    found = unusual_speech(run, audio)
+    if found:
+        what = "; ".join(map(str, found))
+        say(f"warning: {path}: is outside what {name} was trained on: {what}. Its motion may fit less well.")
 
 
 def read_words(path: str | None, tier: str | None, seconds: float) -> "tuple[Word, ...]":

@@ -1,13 +1,13 @@
 """Log-mel spectrograms aligned exactly with the frames of the motion."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy import fft, signal
+from scipy import fft
 
+from a2g_jax.features.mel_filters import hann, mel_filters
 from a2g_jax.features.offset import without_offset
 from a2g_jax.features.samples import mono_samples
 
@@ -40,17 +40,6 @@ class MelConfig:
     def width(self) -> int:
         """Number of values in a row."""
         return self.bands * self.stack
-
-
-@lru_cache(maxsize=8)
-def mel_filters(
-    sample_rate: int, window: int, bands: int, low_hz: float = 0.0, high_hz: float | None = None
-) -> Float[np.ndarray, "bands bins"]:
-    """Triangular mel filters on the bins of a Fourier transform of ``window`` samples."""
-    import librosa  # here, because it takes seconds
-
-    filters = librosa.filters.mel(sr=sample_rate, n_fft=window, n_mels=bands, fmin=low_hz, fmax=high_hz)
-    return filters.astype(np.float32)
 
 
 def active_level_db(audio: Float[np.ndarray, " N"], sample_rate: int) -> float:
@@ -103,11 +92,11 @@ def _log_mel_rows(
     after = max(0, (int(centres[-1]) if frames else 0) + half - len(audio))
     padded = np.pad(audio, (half, after))
     windows = np.lib.stride_tricks.sliding_window_view(padded, config.window)
-    hann = signal.get_window("hann", config.window).astype(np.float32)
+    shape = hann(config.window)
     filters = mel_filters(config.sample_rate, config.window, config.bands, config.low_hz, config.high_hz).T
     rows = np.empty((frames, config.bands), np.float32)
     for start in range(0, frames, _CHUNK):
-        some = windows[centres[start : start + _CHUNK]] * hann
+        some = windows[centres[start : start + _CHUNK]] * shape
         spectrum = fft.rfft(some, axis=1)
         rows[start : start + _CHUNK] = (spectrum.real**2 + spectrum.imag**2) @ filters
     decibels = 10 * np.log10(np.maximum(rows, 1e-10))

@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from a2g_jax.errors import InputError
 from a2g_jax.generation.checked import Checked
 from a2g_jax.generation.delivery import PLAIN, Delivery
-from a2g_jax.generation.formats import PAGE, REPORTS, MotionFiles, check_page_size
+from a2g_jax.generation.formats import ORDERS, PAGE, REPORTS, MotionFiles, check_page_size
 from a2g_jax.generation.generator import Sampler, audio_frames, speech_at_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import check_folder_writable, write_json
@@ -14,6 +15,9 @@ from a2g_jax.io.words import Word
 from a2g_jax.metrics.body.check import BodyFinding
 from a2g_jax.training.run import Run
 from a2g_jax.viz.player import Figure, Track, write_page
+
+if TYPE_CHECKING:
+    from a2g_jax.generation.ranking import Score
 
 
 def export(
@@ -32,11 +36,20 @@ def export(
     report: Callable[[int], None] = lambda done: None,
     sample_rate: int | None = None,
     delivery: Delivery = PLAIN,
+    order: str = "number",
+    scores: "list[Score] | None" = None,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
     Every motion is checked, and drawn again where a body could not do it: see
     :class:`~a2g_jax.generation.checked.Checked`. ``checks.json`` has the bounds, and the findings on each sample.
+
+    Example:
+        >>> import a2g_jax
+        >>> run, audio = a2g_jax.demo_run(), a2g_jax.talk(2.0, seed=5).audio
+        >>> about = {"samples": 2, "seed": 0, "title": "two seconds", "formats": ["bvh", "html"]}
+        >>> a2g_jax.export(run, a2g_jax.Generator(run), audio, "gestures", **about)
+        {'bvh': 2, 'html': 1}
 
     Args:
         run: the sampler's.
@@ -49,6 +62,9 @@ def export(
         report: called with the number of samples done: with ``strict`` once they are checked, else once written.
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
         delivery: the character and the frame rate to write for. Motions are checked before, on the run's skeleton.
+        order: of the figures on the page, by number, or ``"best"`` first (:mod:`a2g_jax.generation.ranking`); then
+            ``checks.json`` has order and scores. Files keep their names.
+        scores: a list that the scores are put into, best first.
 
     Returns:
         How many files of each format were written.
@@ -58,6 +74,8 @@ def export(
             refused. Without ``strict``, those before it stay in the folder, and ``checks.json`` has the findings.
         OutputError: the disk is full, or the folder cannot be written to; files of an earlier call stay.
     """
+    if order not in ORDERS:
+        raise InputError(f"order {order!r}: expected {' or '.join(ORDERS)}.")
     audio, config = speech_at_rate(run, audio, sample_rate), run.config
     if PAGE in formats:
         skeleton = config.skeleton if delivery.character is None else delivery.character.rig.skeleton
@@ -65,6 +83,12 @@ def export(
         check_page_size(samples, frames, skeleton.joints)
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
+    scorer = None
+    if order == "best":
+        from a2g_jax.generation.ranking import Scorer, best_first
+
+        scorer = Scorer(run, audio)
+    ranked: list[Score] = []
     check_folder_writable(out)  # before any work
     if checked.strict:
         motions = list(_counted(motions, report))
@@ -76,6 +100,8 @@ def export(
             for done, motion in enumerate(motions, start=1):
                 made = delivery.make(motion)
                 files.write(done - 1, made.shown, own=made.by_format(delivery.own_format))
+                if scorer is not None:
+                    ranked.append(scorer.score(done - 1, motion, checked.reports[done - 1].findings))
                 if PAGE in formats:
                     findings = checked.reports[done - 1].findings
                     names = files.names(done - 1)
@@ -84,15 +110,19 @@ def export(
                     report(done)
         finally:
             if done:  # motions before one that is refused stay, with the findings on all
-                write_json(files.folder / "checks.json", checked.to_json())
+                ranked = [] if scorer is None else best_first(ranked)
+                write_json(files.folder / "checks.json", checked.to_json() | _order_to_json(ranked))
+        if scores is not None:
+            scores[:] = ranked
         if figures:
+            figures = [figures[one.sample] for one in ranked] or figures
             write_page(
                 files.folder / "index.html",
                 figures,
                 audio,
                 config.mel.sample_rate,
                 title=f"{samples} gestures for {title}" if samples > 1 else f"A gesture for {title}",
-                subtitle=requested(checked, samples, label),
+                subtitle=requested(checked, samples, label, "best first" if len(ranked) > 1 else ""),
                 words=words,
                 lanes=lanes,
                 footer=f"{config.model}, {config.preset} preset, {run.steps} training steps, seed {seed}",
@@ -100,11 +130,19 @@ def export(
     return {kind: 1 if kind == PAGE else samples for kind in formats}
 
 
-def requested(checked: Checked, samples: int, label: str) -> str:
+def _order_to_json(ranked: "Sequence[Score]") -> dict[str, Any]:
+    """The order of ranked samples, and their scores; nothing where none are ranked."""
+    if not ranked:
+        return {}
+    return {"order": [one.sample for one in ranked], "scores": [one.to_json() for one in ranked]}
+
+
+def requested(checked: Checked, samples: int, label: str, order: str = "") -> str:
     """What the page shows, and what was requested."""
     what = "The same speech, and different gestures for it" if samples > 1 else ""
     controls = " ".join(getattr(checked.run.config.sampling_settings, "controls", ()))
-    return "; ".join(part for part in (what, controls, label, getattr(checked.sampler, "caption", "")) if part)
+    caption = getattr(checked.sampler, "caption", "")
+    return "; ".join(part for part in (what, controls, label, caption, order) if part)
 
 
 def _counted(motions: Iterable[Motion], report: Callable[[int], None]) -> Iterator[Motion]:

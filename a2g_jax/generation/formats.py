@@ -62,6 +62,8 @@ MORE_FORMATS: dict[str, MotionFormat] = {
 }
 #: The name of the page of all motions, which :func:`a2g_jax.viz.player.write_page` writes.
 PAGE = "html"
+#: Orders of samples on the page: by number, or by score (:mod:`a2g_jax.generation.ranking`).
+ORDERS = ("number", "best")
 #: Names of the reports of generation beside the motions, a regular expression: those of an earlier call belong to other
 #: motions.
 REPORTS = r"(pins|checks|style)\.json"

@@ -1,6 +1,7 @@
 """Motions for a speech of any length, from a trained run."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -20,6 +21,8 @@ from a2g_jax.models.control_curves import check_ends
 from a2g_jax.training.run import Run
 
 Audio = Float[np.ndarray, " N"]
+#: Generators of other sampling settings that are kept, with their compiled programs.
+_KEPT = 4
 
 
 @runtime_checkable
@@ -32,7 +35,17 @@ class Sampler(Protocol):
 
 
 class Generator:
-    """Generates motion for any audio with a run; sampling settings are those of ``run.config``."""
+    """Generates motion for any audio with a run; sampling settings are those of ``run.config``.
+
+    Example:
+        >>> import a2g_jax
+        >>> speech = a2g_jax.talk(2.0, seed=5)  # or a2g_jax.read_audio("speech.wav", 16000)
+        >>> generator = a2g_jax.Generator(a2g_jax.demo_run())
+        >>> first, second = generator.generate(speech.audio, 2, seed=0, sample_rate=16000)
+        >>> first.frames, first.fps, first.skeleton.joints
+        (60, 30.0, 22)
+        >>> calm = generator.generate(speech.audio, 1, noise_scale=0.5)
+    """
 
     def __init__(self, run: Run, window: int = WINDOW) -> None:
         """
@@ -44,6 +57,25 @@ class Generator:
         """
         self.run = run
         self.engine = Engine(run, window)
+        self._changed: dict[Any, Generator] = {}
+
+    def with_sampling(self, **sampling: Any) -> "Generator":
+        """The generator with other sampling settings; asked again for the same, it is the same, and compiled already.
+
+        Args:
+            sampling: settings of the model, such as ``noise_scale=0.7`` or ``temperature=0.8``.
+
+        Raises:
+            InputError: a setting that the model does not have or that has no effect, or a value out of range.
+        """
+        if not sampling:
+            return self
+        config = self.run.config.with_sampling(**sampling)
+        if config.sampling not in self._changed:
+            while len(self._changed) >= _KEPT:
+                del self._changed[next(iter(self._changed))]
+            self._changed[config.sampling] = Generator(replace(self.run, config=config), self.engine.window)
+        return self._changed[config.sampling]
 
     def frames(self, audio: Any, sample_rate: int | None = None) -> int:
         """Length of the motion for an audio: its seconds times fps, rounded."""
@@ -79,11 +111,12 @@ class Generator:
             seed: of everything random.
             report: called with the number of samples done.
             sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
-            given: further fields of :class:`~a2g_jax.models.base.Condition` that the model uses.
+            given: further fields of :class:`~a2g_jax.models.base.Condition` that the model uses, as arrays; and
+                sampling settings in place of the run's, such as ``noise_scale=0.7`` or ``controls=("energy=0.9",)``.
 
         Raises:
-            InputError: the audio has several channels or is shorter than a frame, or conditioning that the model does
-                not use.
+            InputError: the audio has several channels or is shorter than a frame; conditioning that the model does
+                not use, or a setting that it does not have.
         """
         motions = []
         stream = self.stream(audio, samples, seed, sample_rate=sample_rate, **given)
@@ -96,6 +129,10 @@ class Generator:
         self, audio: Any, samples: int, seed: int = 0, *, sample_rate: int | None = None, **given: Any
     ) -> Iterator[Motion]:
         """Yield the motions of :meth:`generate` one at a time."""
+        sampling = {name: given.pop(name) for name in list(given) if _is_setting(name, given[name])}
+        if sampling:
+            yield from self.with_sampling(**sampling).stream(audio, samples, seed, sample_rate=sample_rate, **given)
+            return
         audio = speech_at_rate(self.run, audio, sample_rate)
         if given.get("controls") is None:
             check_ends(self.engine.lines, self.frames(audio), self.run.config.fps)
@@ -120,6 +157,13 @@ class Generator:
         """Yield different motions in the run's pose space, for log-mel features, not normalised."""
         audio: Any = features
         yield from self.engine.rows(Condition(audio, **given), samples, seed)
+
+
+def _is_setting(name: str, value: Any) -> bool:
+    """Whether an argument is a sampling setting: text, or no field of a condition, which are arrays."""
+    texts = (value,) if isinstance(value, str) else value
+    is_text = isinstance(texts, tuple | list) and all(isinstance(one, str) for one in texts)
+    return name not in Condition._fields or is_text
 
 
 def speech_at_rate(run: Run, audio: Any, sample_rate: int | None) -> Audio:

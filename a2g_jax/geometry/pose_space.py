@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import find_wrists
 from a2g_jax.geometry.euler import continuous_yxz
+from a2g_jax.geometry.host_rotation import matrices_from_6d
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_kinds import WIDTHS as WIDTHS
@@ -306,7 +307,7 @@ def write_motion(motion: Motion, kind: str, where: str) -> tuple[Float[np.ndarra
 
 def rotations_from_rows(values: Float[np.ndarray, "T J D"], kind: str) -> Float[np.ndarray, "T J 3 3"]:
     """Rotation matrices of poses that are rotations."""
-    return np.asarray(matrix_from_6d(values) if kind == "6d" else _matrices(values, kind))
+    return matrices_from_6d(np.asarray(values)) if kind == "6d" else np.asarray(_matrices(values, kind))
 
 
 @partial(jax.jit, static_argnums=1)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.errors import InputError
@@ -55,6 +54,8 @@ def smooth(motion: Motion, cutoff: float = CUTOFF, start: int = 0) -> Motion:
 
 
 def _low_pass(values: Float[np.ndarray, "T C"], fps: float, cutoff: float) -> Float[np.ndarray, "T C"]:
+    from scipy import signal  # here, since it takes half a second
+
     filters = signal.butter(_ORDER, cutoff, fs=fps, output="sos")
     # Reflected about its ends, so that the first and the last pose stay where they are; long enough for the filter.
     pad = min(len(values) - 1, int(3 * fps / cutoff) + 6)

@@ -234,6 +234,12 @@ def write_audio(
 ) -> None:
     """Write mono samples in -1 to 1, atomically; integer formats clip values outside.
 
+    Example:
+        >>> import a2g_jax
+        >>> a2g_jax.write_audio("speech.wav", a2g_jax.talk(2.0, seed=1).audio, 16000)
+        >>> len(a2g_jax.read_audio("speech.wav", 48000))
+        96000
+
     Args:
         path: its suffix is the format: ``.wav``, ``.flac``, ``.ogg`` ...
         subtype: encoding, by libsndfile's names; None takes the format's default.

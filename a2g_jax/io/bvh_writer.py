@@ -33,6 +33,12 @@ def write_bvh(path: str | os.PathLike[str], motion: Motion, *, order: str = "ZXY
 
     Joints of BVH files are in depth-first order: compare them with the original by name.
 
+    Example:
+        >>> import a2g_jax
+        >>> a2g_jax.write_bvh("gesture.bvh", a2g_jax.talk(2.0, seed=1).motion)
+        >>> a2g_jax.read_bvh("gesture.bvh").frames
+        60
+
     Args:
         path: written atomically; missing folders are created.
         order: the rotation channels, a permutation of ``XYZ``.

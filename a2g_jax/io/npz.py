@@ -47,6 +47,12 @@ def write_motion_npz(path: str | os.PathLike[str], motion: Motion) -> None:
     ``end_offsets``         (E, 3)        end sites in their joint's frame, metres
     ======================  ============  ==================================================
 
+    Example:
+        >>> import a2g_jax, numpy as np
+        >>> a2g_jax.write_motion_npz("gesture.npz", a2g_jax.talk(2.0, seed=1).motion)
+        >>> np.load("gesture.npz")["positions"].shape
+        (60, 22, 3)
+
     Raises:
         InputError: another suffix, or a motion with NaN or infinities.
     """

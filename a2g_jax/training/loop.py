@@ -35,6 +35,7 @@ from a2g_jax.training.folder import LOCK, check_folder
 from a2g_jax.training.log import MetricsLog
 from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
 from a2g_jax.training.run_hashes import write_description
+from a2g_jax.training.speech_range import corpus_speech_range, write_speech_range
 from a2g_jax.training.stages import StageSpan, span_at, stage_spans
 from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
 from a2g_jax.training.validation import Validator, collect_summary
@@ -103,7 +104,7 @@ def train(
     make_folder(out)
     try:
         with locked(out / LOCK, f"{out}: is being trained"):
-            config = replace(config, body_extremes=extremes)
+            config = replace(config, body_extremes=extremes, speech_range=corpus_speech_range(recordings, config))
             return _train(config, corpus, recordings, out, model, shape, resume, progress, start)
     except InputError:
         # Some errors are found in a locked folder only, such as word vectors of another length.
@@ -149,6 +150,7 @@ def _train(
     description = run_to_json(config, done)
     # Without the hash of a log from which lines are about to be removed.
     write_description(out, description, before._replace(log=None))
+    write_speech_range(out, config.speech_range)
     with (
         _stop_requested() as stop,
         PartStream(corpus, settings.part_steps, total, arrays=shape.arrays) as parts,

@@ -30,6 +30,7 @@ from a2g_jax.training.run_config import Source as Source
 from a2g_jax.training.run_file import (
     FORMAT,
     RUN_FILE,
+    SHIPPED,
     SHIPPED_FEATURES,
     VERSION,
     WEIGHTS_FILE,
@@ -38,6 +39,7 @@ from a2g_jax.training.run_file import (
     split_settings,
 )
 from a2g_jax.training.run_hashes import Written, read_weights, write_description, write_exchange
+from a2g_jax.training.speech_range import read_speech_range
 
 
 def save_run(folder: str | os.PathLike[str], run: Run, log: Mapping[str, Any] | None = None) -> None:
@@ -90,8 +92,12 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
     }
 
 
-def load_run(folder: str | os.PathLike[str]) -> Run:
+def load_run(folder: str | os.PathLike[str], check_shapes: bool = True) -> Run:
     """Read a run folder.
+
+    Args:
+        check_shapes: whether to compare the weights with the networks, which takes a second; those of the package
+            are compared by its tests.
 
     Raises:
         InputError: not a run, nothing trained yet, or damaged or mismatching files: a changed byte is found by the
@@ -134,6 +140,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
             where = f"{about}: body_extremes"
             found = extremes_from_json(values["body_extremes"], config.body_reference, where)
             config = replace(config, body_extremes=found)
+        config = replace(config, speech_range=read_speech_range(folder, config.mel))
         steps = int(values["steps"])
         gains = {
             name.removeprefix("dynamics/"): array for name, array in arrays.items() if name.startswith("dynamics/")
@@ -153,7 +160,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
     )
-    _check_params(weights, config.build(), params)
+    _check_params(weights, config.build() if check_shapes else None, params)
     summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
     return Run(config, params, summary, steps, dynamics)
 
@@ -170,7 +177,7 @@ def open_run(name: str | os.PathLike[str]) -> Run:
     Raises:
         InputError: not a run, nothing trained yet, or damaged or mismatching files.
     """
-    return load_run(run_folder(name))
+    return load_run(run_folder(name), check_shapes=str(name) not in SHIPPED)
 
 
 def demo_feature_run() -> tuple[Run, str]:
@@ -186,12 +193,15 @@ def keep_sampling(config: RunConfig, folder: Path) -> RunConfig:
     return replace(config, sampling=from_json(config.entry.sampling, sampling, str(about)))
 
 
-def _check_params(weights: Path, model: Model, params: Params) -> None:
-    """Compare shapes with the model's own, before anything is computed."""
+def _check_params(weights: Path, model: Model | None, params: Params) -> None:
+    """Compare shapes with the model's own, where one is given, before anything is computed; refuse NaN."""
     import jax
 
-    expected = flatten_dict(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0)), sep="/")
     found = flatten_dict(params, sep="/")
+    expected = found
+    if model is not None:
+        shapes = jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0))
+        expected = flatten_dict(shapes, sep="/")
     for name in sorted({*expected, *found}):
         want, got = expected.get(name), found.get(name)
         if want is None or got is None or want.shape != got.shape:

@@ -13,6 +13,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.errors import InputError
 from a2g_jax.features.dynamics import Dynamics, rows_with_dynamics
 from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.speech_range import SpeechRange
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
@@ -83,6 +84,8 @@ class RunConfig:
     run."""
     source: Source | None = None
     """The run that training started from; None for initial weights."""
+    speech_range: SpeechRange | None = None
+    """The range of the training split's speech, in a file of its own beside ``run.json``; None if not measured."""
 
     @property
     def entry(self) -> Entry:
@@ -199,6 +202,7 @@ class RunConfig:
                 raise InputError(
                     f"{self.model}: has no sampling setting {name!r}; it has: {', '.join(names) or 'none'}."
                 )
+        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
         changed = replace(self.sampling_settings, **changes)
         check_needs(self.sampling_settings, changed, vars(self.model_config))
         return replace(self, sampling=changed)

@@ -6,7 +6,10 @@ import pytest
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct
+from a2g_jax.models.audio2gestures import edit_presets
+from a2g_jax.models.audio2gestures.edit_presets import EDIT_PRESETS, expanded
 from a2g_jax.models.audio2gestures.edits import Edit, apply_edits, parse_edit
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 
 POINTS = 16
 CODE = jnp.asarray(np.random.default_rng(0).normal(size=(2, 2 * POINTS, 3)), jnp.float32)
@@ -101,3 +104,15 @@ def test_another_code_must_be_given():
 
 def test_no_edit_is_the_code_itself():
     assert apply_edits(CODE, [], POINTS) is CODE
+
+
+def test_presets_are_lines_and_have_forgiving_names():
+    for name, lines in EDIT_PRESETS.items():
+        assert expanded([name]) == expanded([name.replace(" ", "-").upper()]) == lines
+        for line in lines:
+            parse_edit(line, 128)
+        assert name in edit_presets.__doc__
+    assert expanded(["shared keep 3", "calmer"]) == ("shared keep 3", *EDIT_PRESETS["calmer"])
+    assert Audio2GesturesSampling(edits=("smoother",)).all_edits == ("shared keep 10",)
+    with pytest.raises(InputError, match="or is one of: calmer, livelier"):
+        parse_edit("louder", 128)

@@ -56,3 +56,38 @@ def test_runs(path, tmp_path):
     assert len(pictures) >= 4
     assert not any(output.output_type == "error" for output in shown)
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_no_cell_waits_for_a_person_or_needs_a_browser(path):
+    """``interact`` captures output in messages to a browser, and some runners have none that answers."""
+    cells = [cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+    assert not any(word in source for source in cells for word in ("interact(", "interactive", "input(", "Output("))
+    assert not any(line.startswith(("%", "!")) for source in cells for line in source.splitlines())
+
+
+def test_edits_are_drawn_when_they_are_chosen(monkeypatch):
+    """The cells of the edits as a program of their own, without a kernel; a choice redraws the page."""
+    pytest.importorskip("ipywidgets")
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from a2g_jax.models.audio2gestures.edit_presets import EDIT_PRESETS
+
+    cells = nbformat.read(next(p for p in NOTEBOOKS if p.stem == "latent_dct_edits"), as_version=4).cells
+    sources = [cell.source for cell in cells if cell.cell_type == "code"]
+    names: dict = {}
+    for source in [*sources[:2], next(one for one in sources if "ipywidgets" in one)]:
+        exec(source, names)
+    assert names["place"].value == ""
+    names["choice"].value = "calmer"
+    page = names["watch"]("calmer").page
+    assert names["place"].value.startswith("<iframe srcdoc=")
+    for label in ("as drawn", "the talker", "calmer; shared keep 128"):
+        assert label in names["place"].value
+    assert page.count("m/s3") >= 3
+    speed = {
+        name: names["figures"](names["space"].to_motion(names["space"].edit(names["codes"], name)))["speed, m/s"]
+        for name in ("calmer", "livelier", "slower sway")
+    }
+    assert speed["slower sway"] < speed["calmer"] < names["figures"](names["motion"])["speed, m/s"] < speed["livelier"]
+    assert set(EDIT_PRESETS) <= set(names["choice"].options)

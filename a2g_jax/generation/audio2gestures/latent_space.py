@@ -17,6 +17,7 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_space import rotations_from_rows
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
+from a2g_jax.models.audio2gestures.edit_presets import expanded
 from a2g_jax.models.audio2gestures.edits import apply_edits, parse_edit
 from a2g_jax.models.audio2gestures.model import draw_codes
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
@@ -52,7 +53,15 @@ class Codes:
 
 
 class LatentSpace:
-    """Codes of speech and motion, and motion of codes; compiles once for each number of 1024-frame windows."""
+    """Codes of speech and motion, and motion of codes; compiles once for each number of 1024-frame windows.
+
+    Example:
+        >>> import a2g_jax
+        >>> space = a2g_jax.LatentSpace(a2g_jax.demo_run())
+        >>> codes = space.from_audio(a2g_jax.talk(2.0, seed=5).audio, seed=0)
+        >>> space.to_motion(space.edit(codes, "calmer")).frames
+        60
+    """
 
     def __init__(self, run: Run) -> None:
         """
@@ -137,12 +146,13 @@ class LatentSpace:
         """Codes with their DCT bands edited; see :mod:`a2g_jax.models.audio2gestures.edits`.
 
         Args:
+            edits: lines, or names of :data:`~a2g_jax.models.audio2gestures.edit_presets.EDIT_PRESETS`.
             other: codes from which ``swap`` and ``sample`` take bands; at least as long.
 
         Raises:
             InputError: an invalid edit, or one that needs ``other``.
         """
-        parsed = [parse_edit(text, self.points) for text in edits]
+        parsed = [parse_edit(text, self.points) for text in expanded(edits)]
         if other is None and any(edit.action in ("swap", "sample") for edit in parsed):
             raise InputError(f"{', '.join(edits)}: takes bands from another code; give one as 'other'.")
         if other is not None and other.frames < codes.frames:

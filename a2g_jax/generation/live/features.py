@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy import fft, signal
 
-from a2g_jax.features.mel import MelConfig, mel_filters
+from a2g_jax.features.mel import MelConfig
+from a2g_jax.features.mel_filters import hann, mel_filters
 from a2g_jax.generation.live.loudness import Loudness
 from a2g_jax.generation.live.rates import Groups
 
@@ -44,7 +45,7 @@ class LiveFeatures:
         self._rest: Float[np.ndarray, " 1"] | None = None
         self._loudness = Loudness(config.sample_rate)
         self._half = config.window // 2
-        self._hann = signal.get_window("hann", config.window).astype(np.float32)
+        self._hann = hann(config.window)
         bands = config.bands, config.low_hz, config.high_hz
         self._filters = mel_filters(config.sample_rate, config.window, *bands).T
         self._spectra = fps * config.stack

@@ -46,9 +46,14 @@ class Stream:
     which finds out the level and the offset of a recording, and where feet stand, from all of it.
 
     Example:
-        >>> stream = Stream(open_run("demo-flow"), sample_rate=48000)  # doctest: +SKIP
-        >>> stream.warm_up()  # doctest: +SKIP
-        >>> frames = stream.push(samples)  # doctest: +SKIP
+        >>> import a2g_jax, numpy as np
+        >>> stream = a2g_jax.Stream(a2g_jax.demo_run(), sample_rate=16000)
+        >>> stream.warm_up()
+        >>> speech, frames = a2g_jax.talk(2.0, seed=5).audio, 0
+        >>> for start in range(0, len(speech), 1600):  # as a microphone gives them
+        ...     frames += stream.push(speech[start : start + 1600]).frames
+        >>> frames + stream.finish().frames
+        60
     """
 
     def __init__(

@@ -28,6 +28,14 @@ from a2g_jax.geometry.skeleton import Skeleton
 def retarget(motion: Motion, target: Rig | Skeleton | Match, *, source: Rig | None = None) -> Motion:
     """The motion on another skeleton, in the world of that skeleton (its vertical axis, its forward).
 
+    Example:
+        >>> import a2g_jax
+        >>> motion = a2g_jax.talk(2.0, seed=1).motion
+        >>> character = a2g_jax.talk(2.0, seed=2, fingers=True).motion  # or a2g_jax.read_bvh("character.bvh")
+        >>> match = a2g_jax.match_rigs(a2g_jax.find_rig(motion), a2g_jax.find_rig(character))
+        >>> a2g_jax.retarget(motion, match).skeleton.joints
+        52
+
     Args:
         motion: on any humanoid rig.
         target: the target skeleton, or its rig (from :func:`~a2g_jax.geometry.retarget.find_rig`, with options of its

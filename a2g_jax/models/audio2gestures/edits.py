@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.features.dct import block_dct, block_idct
+from a2g_jax.models.audio2gestures.edit_presets import EDIT_PRESETS
 
 CODES = ("shared", "specific")
 
@@ -46,7 +47,8 @@ def parse_edit(text: str, points: int) -> Edit:
     """
     words = text.split()
     if len(words) < 3 or words[0] not in CODES:
-        raise _refused(text, "it begins with 'shared' or 'specific', an action and bands")
+        names = ", ".join(EDIT_PRESETS)
+        raise _refused(text, f"it begins with 'shared' or 'specific', an action and bands, or is one of: {names}")
     code, action, bands, *values = words
     if action == "keep" and not values:
         count = _whole(bands, text)

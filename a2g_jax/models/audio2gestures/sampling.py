@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from a2g_jax.errors import InputError
+from a2g_jax.models.audio2gestures.edit_presets import expanded
 from a2g_jax.models.control_curves import parse_gain, parse_line
 
 
@@ -26,7 +27,8 @@ class Audio2GesturesSampling:
     keep_specific: int | None = None
     """Lowest DCT bands of the specific code that are kept, before other edits; all if not set."""
     edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
-    """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5'; may be repeated."""
+    """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5', or a name: calmer, livelier, smaller, larger,
+    smoother, 'slower sway', 'one posture', 'without speech'; may be repeated."""
     controls: tuple[str, ...] = field(default=(), metadata={"flag": "control", "repeat": True})
     """Requested properties of the motion, as quantiles of the training clips from 0 to 1: energy, height, radius, rate
     and handedness (0 left, 1 right), such as 'energy=0.9', or over seconds 'energy=0.2@0,0.9@10'; and an emotion of
@@ -56,7 +58,7 @@ class Audio2GesturesSampling:
     def all_edits(self) -> tuple[str, ...]:
         """All edits as lines of :mod:`a2g_jax.models.audio2gestures.edits`, those of ``keep_*`` first."""
         kept = (("shared", self.keep_shared), ("specific", self.keep_specific))
-        return (*(f"{name} keep {count}" for name, count in kept if count is not None), *self.edits)
+        return (*(f"{name} keep {count}" for name, count in kept if count is not None), *expanded(self.edits))
 
 
 #: Sampling settings by preset; the papers' for presets that are missing.

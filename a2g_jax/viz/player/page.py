@@ -56,6 +56,12 @@ def write_page(
     and follows the reader's light or dark theme. Figures may differ in skeleton, frame rate and length; all start at
     time zero of the audio, and one that ends before the audio holds its last frame.
 
+    Example:
+        >>> import a2g_jax
+        >>> speech = a2g_jax.talk(2.0, seed=1)
+        >>> figures = [a2g_jax.Figure(speech.motion, "the talker")]
+        >>> a2g_jax.write_page("page.html", figures, speech.audio, speech.sample_rate, title="Two seconds")
+
     Args:
         path: the file to write; replaced atomically.
         figures: at least one.
