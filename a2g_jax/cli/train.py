@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.cli.argument_types import VERIFY
+from a2g_jax.cli.argument_types import VERIFY, device_count
 from a2g_jax.cli.paths import existing_corpus, existing_features, existing_run, writable_folder
 from a2g_jax.config import from_json, parse_flags, settings_lines
 from a2g_jax.errors import InputError
@@ -45,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--resume",
         action="store_true",
         help="resume from the latest checkpoint with the settings of the run, or start where there is none",
+    )
+    parser.add_argument(
+        "--devices",
+        type=device_count,
+        metavar="N|all",
+        help="devices that share the clips of each batch; several hosts by JAX_COORDINATOR_ADDRESS, JAX_NUM_PROCESSES"
+        " and JAX_PROCESS_ID, or Slurm (default: 1; with several processes all)",
     )
     parser.add_argument("--verify", action="store_true", help=VERIFY)
     parser.add_argument("--settings", action="store_true", help="list every setting with its value, and exit")
@@ -87,7 +94,16 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     if options.resume and stored is None:
         print(f"{options.out}: holds no run to resume; training starts at step 0")
 
+    from a2g_jax.training.processes import joined_processes
+
+    with joined_processes():
+        _train(options, preset, model, training)
+
+
+def _train(options: argparse.Namespace, preset: str, model: Any, training: TrainConfig) -> None:
+    """Train, and print what may follow."""
     from a2g_jax.compilations import keep_compilations
+    from a2g_jax.training.processes import is_first
     from a2g_jax.training.start import run_training
 
     keep_compilations()
@@ -102,7 +118,10 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
         options.features,
         options.source,
         options.verify,
+        options.devices,
     )
+    if not is_first():
+        return
     # A run folder names its model, and code of other packages is imported only by permission.
     allowed = f"A2G_MODELS={options.model} " if ":" in options.model else ""
     following = f"{allowed}a2g generate {options.out} --audio speech.wav --out DIR"

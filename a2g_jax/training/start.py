@@ -28,6 +28,7 @@ def run_training(
     features: str | Path | None = None,
     source: str | None = None,
     verify: bool = False,
+    devices: int | str | None = None,
 ) -> Run:
     """Train a model from the paths of a corpus, a feature network and a run to start from.
 
@@ -41,6 +42,7 @@ def run_training(
         source: a run folder, or a shipped run, whose weights the training starts from. It is not needed to resume:
             what is kept of it is stored in ``out`` with the first checkpoint.
         verify: read all files of the corpus to compare their hashes, see :func:`~a2g_jax.training.loop.train`.
+        devices: how many share the clips of each batch, see the same.
 
     Raises:
         InputError: a corpus, run or feature network that cannot be used, or recordings that do not fit the source.
@@ -63,12 +65,12 @@ def run_training(
             source=before.config.source,
         )
         # The checkpoint replaces these parameters.
-        return train(config, opened, out, resume=True, start=before.params, verify=verify)
+        return train(config, opened, out, resume=True, start=before.params, verify=verify, devices=devices)
     if source is None and stored is not None:
         source = stored["run"]
     if source is None:
         config = RunConfig.of(name, preset, model, training, opened, perceptual)
-        return train(config, opened, out, resume=resume, verify=verify)
+        return train(config, opened, out, resume=resume, verify=verify, devices=devices)
     start = start_from(source, open_run(source))
     config = tuned_config(start, model, training, opened, perceptual)
     if config.sampling != start.run.config.sampling:
@@ -76,7 +78,7 @@ def run_training(
             f"{out}: gains of controls are not taken from {source}, whose weights they were measured on; measure those"
             f" of the new weights with 'python -m experiments.controls {out} --store'."
         )
-    return train(config, opened, out, resume=resume, start=start.run.params, verify=verify)
+    return train(config, opened, out, resume=resume, start=start.run.params, verify=verify, devices=devices)
 
 
 def _stored_source(out: Path) -> dict[str, Any] | None:
