@@ -74,16 +74,23 @@ def main(path: str) -> None:
     from a2g_jax.config import from_json
     from a2g_jax.models import find_model
     from a2g_jax.models.train_config import TrainConfig
+    from a2g_jax.training.processes import joined_processes
     from a2g_jax.training.start import run_training
 
     values = json.loads(Path(path).read_text(encoding="utf-8"))
     model = from_json(find_model(values["name"]).config, values["model"], "model")
     training = from_json(TrainConfig, values["training"], "training")
     more = {"devices": values["devices"]} if values.get("devices") else {}
-    run_training(
-        values["name"], "tiny", model, training, values["corpus"], values["out"], values.get("resume", False), **more
-    )
+    about = values["name"], "tiny", model, training, values["corpus"], values["out"], values.get("resume", False)
+    with joined_processes():
+        run_training(*about, **more)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    from a2g_jax.errors import A2GError, Interrupted
+
+    try:
+        main(sys.argv[1])
+    except A2GError as error:  # as the command line does
+        print(f"a2g: {error}", file=sys.stderr)
+        sys.exit(130 if isinstance(error, Interrupted) else 2)
