@@ -11,6 +11,9 @@ class TrainConfig:
 
     steps: int = 180_000
     """Training steps, those done before a resume included; a model may add stages with their own number of steps."""
+    stage_steps: tuple[int, ...] = ()
+    """Steps of each stage, in place of those of the settings; written by ``--resume --steps`` with more steps, which
+    extends the last stage."""
     batch_size: int = 32
     """Clips in a batch."""
     learning_rate: float = 1e-4
@@ -63,6 +66,8 @@ class TrainConfig:
         for name in counts:
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
+        if any(steps < 0 for steps in self.stage_steps):
+            raise InputError(f"--stage-steps: expected 0 or more for each stage; got {self.stage_steps}.")
         for name in ("warmup_steps", "patience", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")

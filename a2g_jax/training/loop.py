@@ -31,6 +31,7 @@ from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
 from a2g_jax.training.devices import Devices, find_devices
 from a2g_jax.training.dynamics import corpus_dynamics
 from a2g_jax.training.early_stopping import Validations, ended, read_metrics, validations
+from a2g_jax.training.extension import extended
 from a2g_jax.training.fine_tuning import training_model, with_validation
 from a2g_jax.training.folder import LOCK, check_folder
 from a2g_jax.training.log import MetricsLog, NoLog
@@ -92,6 +93,11 @@ def train(
     shared, first = find_devices(devices, settings.batch_size), is_first()
     verify_corpus(corpus, verify)
     model = training_model(config)
+    if resume:
+        settings, extension = extended(settings, model, out)
+        config = replace(config, train_config=settings)
+        if extension and first:
+            say(extension)
     extremes, recordings = corpus_extremes(corpus, config), corpus
     if config.source is not None:
         corpus, note = with_validation(corpus, model.clip_frames)
