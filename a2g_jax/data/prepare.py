@@ -144,7 +144,13 @@ def prepare_data_set(
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
         Interrupted: by Ctrl-C; the same call resumes.
     """
-    choices = {"seed": seed, "official": official, "skip_broken": skip_broken, "limit": limit, "labels": labels}
+    choices: dict[str, Any] = {
+        "seed": seed,
+        "official": official,
+        "skip_broken": skip_broken,
+        "limit": limit,
+        "labels": labels,
+    }
     choices |= {"confidence": confidence, "labelled": labelled, "skeleton": skeleton, "channel": channel}
     return prepare_work(out, data_set_work(name, source, features, **choices, tier=tier, smooth=smooth), workers)
 

@@ -38,7 +38,7 @@ class Share(NamedTuple):
 
     number: int
     """From 1 on."""
-    count: int
+    shards: int
 
     @classmethod
     def parse(cls, text: str) -> "Share":
@@ -54,7 +54,7 @@ class Share(NamedTuple):
 
     def of(self, total: int) -> slice:
         """Its recordings among all; consecutive ones."""
-        return slice(total * (self.number - 1) // self.count, total * self.number // self.count)
+        return slice(total * (self.number - 1) // self.shards, total * self.number // self.shards)
 
 
 class Made(NamedTuple):
@@ -83,12 +83,12 @@ def prepare_shard(
         Interrupted: by Ctrl-C; the same call resumes.
     """
     total = len(work.items)
-    if total < share.count:
-        raise InputError(f"--shard {share.number}/{share.count}: there are {total} recordings; use at most as many.")
+    if total < share.shards:
+        raise InputError(f"--shard {share.number}/{share.shards}: there are {total} recordings; use at most as many.")
     rows = share.of(total)
     mine = work._replace(items=work.items[rows], inputs=work.inputs[rows])
     finish = partial(_finish_shard, share=share, names=[item.name for item in work.items])
-    more = {"shard": f"{share.number}/{share.count}"}
+    more = {"shard": f"{share.number}/{share.shards}"}
     write_rows(out, mine.items, mine.maker(workers), work.plan, report, finish, more)
     entries = [Entry(**entry) for entry in read_sealed(Path(out) / SHARD)["recordings"]]
     return Made(Path(out), len(entries), sum(entry.frames for entry in entries) / work.plan.features.fps)
@@ -110,7 +110,7 @@ def _finish_shard(
     about = {
         "format": _FORMAT,
         "shard": share.number,
-        "of": share.count,
+        "of": share.shards,
         "names": names,
         "plan": plan_to_json(plan),
         "features": plan.features.to_json(),

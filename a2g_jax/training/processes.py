@@ -32,7 +32,7 @@ class Place(NamedTuple):
     """This process among those of a training; fields are None where Slurm decides them."""
 
     address: str | None
-    count: int | None
+    processes: int | None
     number: int | None
 
 
@@ -44,9 +44,9 @@ def find_place(environment: Mapping[str, str] = os.environ) -> Place | None:
     """
     given = [name for name in (_ADDRESS, _COUNT, _NUMBER) if environment.get(name)]
     if not given:
-        count = environment.get(_SLURM_COUNT, "1")
-        several = _SLURM_NUMBER in environment and count.isdigit() and int(count) > 1
-        return Place(None, None, None) if several else None
+        tasks = environment.get(_SLURM_COUNT, "1")
+        many = _SLURM_NUMBER in environment and tasks.isdigit() and int(tasks) > 1
+        return Place(None, None, None) if many else None
     if given == [_COUNT] and environment[_COUNT] == "1":
         return None
     if missing := [name for name in (_ADDRESS, _COUNT, _NUMBER) if name not in given]:
@@ -110,7 +110,7 @@ def _join(place: Place) -> None:
     with suppress(AttributeError):  # its handler of SIGTERM would take the place of the loop's
         jax.config.update("jax_enable_preemption_service", False)
     try:
-        jax.distributed.initialize(place.address, place.count, place.number)
+        jax.distributed.initialize(place.address, place.processes, place.number)
     except (RuntimeError, ValueError) as error:
         raise InputError(
             f"the processes of the training cannot join ({str(error).splitlines()[0][:200]}); check {_ADDRESS},"
@@ -185,7 +185,7 @@ class _Watch:
 
     def message(self, reason: str) -> str:
         """The line about a lost process."""
-        where = "" if self._place.number is None else f"process {self._place.number} of {self._place.count}: "
+        where = "" if self._place.number is None else f"process {self._place.number} of {self._place.processes}: "
         if self._state == "joining":
             return (
                 f"{where}the others did not join at {self._place.address or 'the address that Slurm gives'}; start all"

@@ -119,7 +119,7 @@ class _Ahead:
         """
         if self._key is None:
             # Of one device, also where the state is on several.
-            self._key = jax.random.wrap_key_data(np.asarray(jax.random.key_data(state.key)))
+            self._key = jax.random.wrap_key_data(jnp.asarray(np.asarray(jax.random.key_data(state.key))))
             self._step = int(state.step)
         clips = self._read(self._key, self._step) if self._next is None else self._next.result()
         self._step += 1
