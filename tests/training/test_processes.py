@@ -120,7 +120,7 @@ def wait_for_checkpoint(out, processes):
     raise AssertionError("no checkpoint")
 
 
-LONG = {"steps": 400, "checkpoint_every": 20, "validate_every": 400}
+LONG = {"steps": 120, "checkpoint_every": 10, "validate_every": 120}
 
 
 @pytest.fixture(scope="module")
