@@ -29,6 +29,15 @@ def from_json(cls: type[Config], values: Mapping[str, Any], where: str) -> Confi
     return cls(**{name: _checked(value, hints[name], f"{where}: {name}") for name, value in values.items()})
 
 
+def checked_value(cls: type[Any], name: str, value: Any, where: str) -> Any:
+    """A JSON or TOML value as that of field ``name``; a list becomes a tuple.
+
+    Raises:
+        InputError: it is of another type; the message starts with ``where``.
+    """
+    return _checked(value, typing.get_type_hints(cls)[name], where)
+
+
 def parse_text(cls: type[Any], name: str, text: str) -> Any:
     """The value of field ``name`` written as command-line text; tuples are comma-separated.
 

@@ -57,6 +57,24 @@ def channel(text: str) -> int:
         raise argparse.ArgumentTypeError(f"expected left, right or a number from 1 on; got {text!r}") from None
 
 
+def seed_list(text: str) -> tuple[int, ...]:
+    """An argument type for different seeds, comma-separated."""
+    seeds = tuple(seed(part.strip()) for part in text.split(",") if part.strip())
+    if not seeds or len(set(seeds)) < len(seeds):
+        raise argparse.ArgumentTypeError(f"expected different whole numbers, comma-separated; got {text!r}")
+    return seeds
+
+
+def device_count(text: str) -> int | str:
+    """An argument type for a number of devices, or ``all``."""
+    if text == "all":
+        return text
+    try:
+        return int(number(int, 1, 10**6, "")(text))
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"expected a whole number above 0, or all; got {text!r}") from None
+
+
 def formats(known: tuple[str, ...]) -> Callable[[str], tuple[str, ...]]:
     """An argument type for a comma-separated list of file formats."""
 

@@ -28,6 +28,7 @@ from a2g_jax.geometry.pose_kinds import WIDTHS
 if TYPE_CHECKING:
     from a2g_jax.data.corpus import Corpus
     from a2g_jax.data.generated import TalkerOptions
+    from a2g_jax.data.prepare import Work
     from a2g_jax.data.settings import Features
     from a2g_jax.geometry.skeleton import Skeleton
 
@@ -70,6 +71,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", nargs="?", metavar="DIR", help="the data set's folder")
     parser.add_argument("--list", action="store_true", help="list what can be prepared, and exit")
     parser.add_argument("--out", metavar="CORPUS", help="folder to make")
+    parser.add_argument(
+        "--shard",
+        metavar="I/N",
+        help="prepare the I-th of N shares of the recordings, on one of N machines; --out is the shard's folder",
+    )
+    parser.add_argument(
+        "--merge", nargs="+", metavar="SHARD", help="make the corpus of all of its shards, with --out CORPUS alone"
+    )
     parser.add_argument("--seed", type=seed, default=0, help="of the generated talk and of the splits (default: 0)")
     parser.add_argument(
         "--workers", type=count, help="processes; the corpus does not depend on it (default: one a core)"
@@ -157,19 +166,28 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     if options.list:
         _list_data_sets()
         return
+    if options.merge is not None:
+        print(_summary(_merged(options)))
+        return
     if options.reader is None:
         raise InputError("name what to prepare: 'a2g prepare talker', or a data set ('a2g prepare --list').")
     if options.out is None:
         raise InputError("--out is needed: the folder to make.")
     writable_folder(str(Path(options.out).parent))
-    corpus = _generated(options) if options.reader == "talker" else _recorded(options)
-    seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
-    print(
-        f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
-        f" {corpus.space.rows} {corpus.space.noun} at {corpus.fps:g} fps ("
-        + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
-        + ")"
-    )
+    work = _generated(options) if options.reader == "talker" else _recorded(options)
+
+    from a2g_jax.data.prepare import prepare_work
+    from a2g_jax.data.shards import Share, prepare_shard
+
+    if options.shard is not None:
+        made = prepare_shard(options.out, work, Share.parse(options.shard), options.workers)
+        print(
+            f"{made.path}: shard {options.shard}, {made.recordings} recordings, {made.seconds / 60:.1f} minutes; when"
+            " all are there: a2g prepare --merge SHARD ... --out CORPUS"
+        )
+        return
+    corpus = prepare_work(options.out, work, options.workers)
+    print(_summary(corpus))
     if corpus.on_demand:
         roles = [role for part in corpus.later["parts"] for role in part]
         minutes = sum(role["seconds"] for role in roles) / 60
@@ -179,24 +197,45 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
         )
 
 
-def _generated(options: argparse.Namespace) -> "Corpus":
+def _summary(corpus: "Corpus") -> str:
+    """Name, length and splits of a corpus in a line."""
+    seconds = {name: sum(part.frames for part in parts) / corpus.fps for name, parts in corpus.splits.items()}
+    return (
+        f"{corpus.path}: {len(corpus.recordings)} recordings, {corpus.frames / corpus.fps / 60:.1f} minutes,"
+        f" {corpus.space.rows} {corpus.space.noun} at {corpus.fps:g} fps ("
+        + ", ".join(f"{name} {value:.0f} s" for name, value in seconds.items())
+        + ")"
+    )
+
+
+def _merged(options: argparse.Namespace) -> "Corpus":
+    """The corpus of all shards."""
+    others = {name: value for name, value in vars(options).items() if name not in ("merge", "out", "command", "debug")}
+    if any(value not in (None, False, 0) for value in others.values()):
+        raise InputError("--merge: takes the folders of the shards and --out alone; their settings are in them.")
+    if options.out is None:
+        raise InputError("--out is needed: the folder to make.")
+    for shard in options.merge:
+        existing_folder(shard)
+    writable_folder(str(Path(options.out).parent))
+
+    from a2g_jax.data.shards import merge_shards
+
+    return merge_shards(options.merge, options.out)
+
+
+def _generated(options: argparse.Namespace) -> "Work":
     if options.source is not None:
         raise InputError("'a2g prepare talker' takes no source; it generates its recordings.")
     _refuse(options, _RECORDED, "recordings; a generated corpus has the joints of --view and --fingers.")
 
     from a2g_jax.data.on_demand import OnDemand
-    from a2g_jax.data.prepare import prepare_talker, view_poses
+    from a2g_jax.data.prepare import talker_work, view_poses
 
     view = options.view or "body"
     if options.pose and options.pose not in view_poses(view):
         raise InputError(f"--pose {options.pose}: the view {view!r} shows {' or '.join(view_poses(view))}.")
-    return prepare_talker(
-        options.out,
-        _talker_options(options, view),
-        _features(options),
-        workers=options.workers,
-        on_demand=OnDemand() if options.on_demand else None,
-    )
+    return talker_work(_talker_options(options, view), _features(options), OnDemand() if options.on_demand else None)
 
 
 def _talker_options(options: argparse.Namespace, view: str) -> "TalkerOptions":
@@ -222,7 +261,7 @@ def _talker_options(options: argparse.Namespace, view: str) -> "TalkerOptions":
     )
 
 
-def _recorded(options: argparse.Namespace) -> "Corpus":
+def _recorded(options: argparse.Namespace) -> "Work":
     if options.source is None:
         raise InputError(f"name the folder: a2g prepare {options.reader} SOURCE --out CORPUS.")
     _refuse(options, _GENERATED, "'a2g prepare talker'; recordings are prepared as they are.")
@@ -236,7 +275,7 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
             raise InputError(f"--{name}: is decided by --for {options.for_run}; leave one of them out.")
 
     from a2g_jax.data.datasets import find_data_set
-    from a2g_jax.data.prepare import prepare_data_set
+    from a2g_jax.data.prepare import data_set_work
 
     reader, skeleton = find_data_set(options.reader), None
     features = _features(options)
@@ -244,10 +283,9 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         features, skeleton = _of_run(options)
     elif options.features is None:
         features = dataclasses.replace(features, fps=options.fps or reader.fps, pose=options.pose or reader.pose)
-    return prepare_data_set(
+    return data_set_work(
         options.reader,
         options.source,
-        options.out,
         features,
         seed=options.seed,
         official=not options.random_split,
@@ -256,7 +294,6 @@ def _recorded(options: argparse.Namespace) -> "Corpus":
         labels=options.labels,
         confidence=options.confidence,
         labelled=options.labelled,
-        workers=options.workers,
         skeleton=skeleton,
         channel=options.channel,
         tier=options.tier,

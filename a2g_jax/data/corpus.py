@@ -18,6 +18,7 @@ from a2g_jax.data.corpus_layout import (
     FORMAT,
     MANIFEST,
     PARTS,
+    SHARD,
     VERSION,
     VERSION_ON_DEMAND,
     WAVEFORM,
@@ -73,6 +74,8 @@ class Corpus:
             InputError: not a corpus, a damaged one, or one of a later version.
         """
         path = Path(path)
+        if (path / SHARD).is_file():
+            raise InputError(f"{path}: is one shard of a corpus; merge all of them with 'a2g prepare --merge'.")
         if not (path / MANIFEST).is_file():
             raise InputError(f"{path}: is not a corpus (no {MANIFEST} in it); make one with 'a2g prepare'.")
         manifest = read_sealed(path / MANIFEST, SEALED_WITH)

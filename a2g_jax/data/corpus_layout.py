@@ -7,6 +7,8 @@ FORMAT = "a2g_jax corpus"
 #: Versions of corpora that store all recordings, and of those that generate most of them in training.
 VERSION, VERSION_ON_DEMAND = 1, 2
 MANIFEST = "manifest.json"
+#: In place of the manifest, in a part of a corpus that is prepared on one of several machines.
+SHARD = "shard.json"
 #: In a corpus of the second kind: the recipes of the recordings to generate, part by part.
 PARTS = "parts.json"
 #: The arrays of a corpus, all recordings one after the other: log-mel (N, width), poses (N, R, D), root (N, 3).

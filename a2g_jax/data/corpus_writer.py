@@ -86,9 +86,28 @@ def prepare_corpus(
             joints.
         Interrupted: by Ctrl-C.
     """
+    write_rows(path, items, make, plan, report, finish_corpus)
+    return Corpus.open(path)
+
+
+def write_rows(
+    path: str | os.PathLike[str],
+    items: Sequence[Item],
+    make: Callable[[int], Generator[Prepared | Skipped, None, None]],
+    plan: Plan,
+    report: Callable[[str], None],
+    finish: Callable[[Unfinished, Path, Plan, Callable[[str], None]], None],
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Write rows as :func:`prepare_corpus` does.
+
+    Args:
+        finish: gives the work its name; see :func:`finish_corpus`.
+        more: what the unfinished work depends on, beside the plan.
+    """
     path = Path(path)
-    with _place(path) as folder:
-        _discard_unless_same(folder, path, plan, report)
+    with place(path) as folder:
+        _discard_unless_same(folder, path, plan, report, more or {})
         work = Unfinished(folder, plan.features)
         total = len(items)
         try:
@@ -99,7 +118,7 @@ def prepare_corpus(
             with closing(make(done)) as rows:
                 for item in rows:
                     _add(work, item, plan.skip_broken, report)
-            _finish(work, path, plan, report)
+            finish(work, path, plan, report)
         except KeyboardInterrupt:
             raise Interrupted(
                 f"{path}: stopped after {work.done} of {total} recordings; run the same command to resume."
@@ -112,7 +131,6 @@ def prepare_corpus(
             work.close()
             if not work.done:
                 shutil.rmtree(folder, ignore_errors=True)
-    return Corpus.open(path)
 
 
 def _add(work: Unfinished, item: Prepared | Skipped, skip: bool, report: Callable[[str], None]) -> None:
@@ -154,7 +172,7 @@ def write_corpus(
         InputError: the folder exists, there are no recordings, or they have different joints.
     """
     path = Path(path)
-    with _place(path) as folder:
+    with place(path) as folder:
         shutil.rmtree(folder, ignore_errors=True)
         work = Unfinished(folder, features)
         try:
@@ -162,7 +180,7 @@ def write_corpus(
             for item in prepared:
                 check_finite(item)
                 work.append(item)
-            _finish(work, path, Plan(features, recipe, seed), report)
+            finish_corpus(work, path, Plan(features, recipe, seed), report)
         finally:
             work.close()
             shutil.rmtree(folder, ignore_errors=True)
@@ -176,7 +194,7 @@ def _refuse_existing(path: Path) -> None:
 
 
 @contextmanager
-def _place(path: Path) -> Iterator[Path]:
+def place(path: Path) -> Iterator[Path]:
     """The folder for unfinished work on a corpus, locked against other processes."""
     folder = path.parent / f".{path.name}.unfinished"
     if not folder.exists():
@@ -195,11 +213,19 @@ def _place(path: Path) -> Iterator[Path]:
             raise unwritable(path, error, "free some space, then run the same command to resume") from error
 
 
-def _discard_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
-    """Remove unfinished work of another recipe, and record this one."""
+def plan_to_json(plan: Plan) -> dict[str, Any]:
+    """What the rows of a corpus depend on."""
     about = {**plan.features.to_json(), "package": __version__, "layout": _LAYOUT}
     rest = {"parts": plan.parts, "official splits": plan.official, "skip broken": plan.skip_broken}
-    now = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
+    values: dict[str, Any] = json.loads(json.dumps({**about, "seed": plan.seed, **plan.recipe, **rest}))
+    return values
+
+
+def _discard_unless_same(
+    folder: Path, path: Path, plan: Plan, report: Callable[[str], None], more: Mapping[str, Any]
+) -> None:
+    """Remove unfinished work of another recipe, and record this one."""
+    now = {**plan_to_json(plan), **more}
     if folder.is_dir():
         try:
             before = read_json(folder / _RECIPE)
@@ -219,7 +245,7 @@ def _discard_unless_same(folder: Path, path: Path, plan: Plan, report: Callable[
     write_json(folder / _RECIPE, now)
 
 
-def _finish(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
+def finish_corpus(work: Unfinished, path: Path, plan: Plan, report: Callable[[str], None]) -> None:
     """Write everything but the rows; then give the corpus its name."""
     entries, body, folder, features = work.entries, work.body, work.corpus, plan.features
     if body is None:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from io import BytesIO
@@ -49,6 +49,10 @@ class Unfinished:
         self._arrays = (*ARRAYS, WAVEFORM) if features.waveform else ARRAYS
         self._hashes: dict[str, str] = {}
         self._files: dict[str, BinaryIO] = {}
+
+    def trust(self, hashes: Mapping[str, str]) -> None:
+        """Take SHA-256 of source files that are not at hand."""
+        self._hashes.update(hashes)
 
     @property
     def frames(self) -> int:
@@ -99,7 +103,7 @@ class Unfinished:
             len(item.audio),
             item.speaker,
             item.emotion,
-            self._hash_sources(item.sources),
+            self.hashes_of(item.sources),
             item.split,
             self._samples,
             0 if item.waveform is None else len(item.waveform),
@@ -119,7 +123,7 @@ class Unfinished:
 
     def skip(self, item: Skipped) -> None:
         """Note a recording that cannot be prepared; it is tried again once one of its files has changed."""
-        self._write_line({"skipped": asdict(item), "sources": self._hash_sources(item.sources)})
+        self._write_line({"skipped": asdict(item), "sources": self.hashes_of(item.sources)})
         self.skipped.append(item)
 
     def _write_line(self, value: dict[str, Any]) -> None:
@@ -128,7 +132,7 @@ class Unfinished:
             journal.flush()
             os.fsync(journal.fileno())
 
-    def _hash_sources(self, sources: tuple[str, ...]) -> dict[str, str]:
+    def hashes_of(self, sources: tuple[str, ...]) -> dict[str, str]:
         """SHA-256 of files, each read once: large ones are the sources of many recordings."""
         for source in sources:
             if source not in self._hashes:
@@ -184,7 +188,7 @@ class Unfinished:
         """Whether a recording is complete on the disk and its sources are unchanged; if so, add it to the entries."""
         if "skipped" in line:
             skipped = Skipped(name, files, line["skipped"]["reason"])
-            if line["skipped"]["name"] != name or line["sources"] != self._hash_sources(files):
+            if line["skipped"]["name"] != name or line["sources"] != self.hashes_of(files):
                 return False
             self.skipped.append(skipped)
             return True
@@ -195,7 +199,7 @@ class Unfinished:
         if self.body is None:
             self.body = body_from_json(line["body"])
         try:
-            same = self._hash_sources(files) == entry.sources
+            same = self.hashes_of(files) == entry.sources
             same = same and sha256_file(self._annotations(number)) == line["annotations"]
         except InputError:
             same = False

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from a2g_jax.data.body_json import skeleton_to_json
 from a2g_jax.data.corpus import Corpus
@@ -33,6 +33,23 @@ from a2g_jax.talker.views.catalogue import find_view
 Result = TypeVar("Result")
 
 
+class Work(NamedTuple):
+    """The recordings of a corpus that is to be written, in order."""
+
+    what: str
+    """For the progress bar, such as ``"preparing"``."""
+    items: list[Item]
+    inputs: list[Any]
+    """What each is made of."""
+    make: Callable[[Any], Any]
+    """From one of ``inputs`` to rows; processes can import it."""
+    plan: Plan
+
+    def maker(self, workers: int | None) -> Callable[[int], Generator[Prepared | Skipped, None, None]]:
+        """Rows of the recordings after those that are finished; see :func:`make_rows`."""
+        return partial(make_rows, self.what, self.make, self.inputs, workers)
+
+
 def prepare_talker(
     out: str | os.PathLike[str],
     options: TalkerOptions,
@@ -53,6 +70,11 @@ def prepare_talker(
         InputError: the folder exists, or there are too few minutes.
         Interrupted: by Ctrl-C; the same call resumes.
     """
+    return prepare_work(out, talker_work(options, features, on_demand), workers)
+
+
+def talker_work(options: TalkerOptions, features: Features | None = None, on_demand: OnDemand | None = None) -> Work:
+    """The work of :func:`prepare_talker`, recording by recording."""
     features, poses = features or Features(), view_poses(options.view)
     pose = features.pose if features.pose in poses else poses[0]
     features = replace(features, fps=options.fps, pose=pose, joints="all")
@@ -66,8 +88,12 @@ def prepare_talker(
         generate_rows, jitter=options.jitter, fingers=options.fingers, view=options.view, features=features
     )
     items = [Item(role["name"], ()) for role in roles]
-    make = partial(make_rows, "generating", generate, roles, workers)
-    return prepare_corpus(out, items, make, Plan(features, recipe, options.seed, parts), say)
+    return Work("generating", items, roles, generate, Plan(features, recipe, options.seed, parts))
+
+
+def prepare_work(out: str | os.PathLike[str], work: Work, workers: int | None = None) -> Corpus:
+    """Write a corpus; see :func:`prepare_talker` and :func:`prepare_data_set`."""
+    return prepare_corpus(out, work.items, work.maker(workers), work.plan, say)
 
 
 def view_poses(view: str) -> tuple[str, ...]:
@@ -118,6 +144,35 @@ def prepare_data_set(
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
         Interrupted: by Ctrl-C; the same call resumes.
     """
+    choices: dict[str, Any] = {
+        "seed": seed,
+        "official": official,
+        "skip_broken": skip_broken,
+        "limit": limit,
+        "labels": labels,
+    }
+    choices |= {"confidence": confidence, "labelled": labelled, "skeleton": skeleton, "channel": channel}
+    return prepare_work(out, data_set_work(name, source, features, **choices, tier=tier, smooth=smooth), workers)
+
+
+def data_set_work(
+    name: str,
+    source: str | os.PathLike[str],
+    features: Features,
+    *,
+    seed: int = 0,
+    official: bool = True,
+    skip_broken: bool = False,
+    limit: int | None = None,
+    labels: str | os.PathLike[str] | None = None,
+    confidence: float | None = None,
+    labelled: bool = False,
+    skeleton: Skeleton | None = None,
+    channel: int | None = None,
+    tier: str | None = None,
+    smooth: float | None = None,
+) -> Work:
+    """The work of :func:`prepare_data_set`, recording by recording."""
     reader, folder = find_data_set(name), Path(source)
     takes = reader.find(folder)
     if limit is not None and limit < len(takes):
@@ -150,7 +205,7 @@ def prepare_data_set(
     items = [Item(take.name, take.sources) for take in takes]
     groups = {take.name: take.group for take in takes if take.group}
     plan = Plan(features, recipe, seed, official=official, groups=groups, skip_broken=skip_broken)
-    return prepare_corpus(out, items, partial(make_rows, "preparing", read, takes, workers), plan, say)
+    return Work("preparing", items, takes, read, plan)
 
 
 def _pieces(

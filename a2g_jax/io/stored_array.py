@@ -7,12 +7,15 @@ what was computed from it. Here every piece is read by the system's ``pread``, a
 import math
 import os
 from pathlib import Path
+from threading import Lock
 from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
 from a2g_jax.errors import InputError
+
+_SEEKING = Lock()
 
 
 class StoredArray:
@@ -119,8 +122,9 @@ class StoredArray:
 def _read_at(file: Any, view: memoryview, at: int) -> int:
     if hasattr(os, "preadv"):
         return os.preadv(file.fileno(), [view], at)
-    file.seek(at)  # Windows
-    return file.readinto(view)
+    with _SEEKING:  # Windows; a training reads ahead in a thread
+        file.seek(at)
+        return file.readinto(view)
 
 
 def _header(file: Any) -> tuple[tuple[int, ...], np.dtype, int]:

@@ -11,6 +11,9 @@ class TrainConfig:
 
     steps: int = 180_000
     """Training steps, those done before a resume included; a model may add stages with their own number of steps."""
+    stage_steps: tuple[int, ...] = ()
+    """Steps of each stage, in place of those of the settings; written by ``--resume --steps`` with more steps, which
+    extends the last stage."""
     batch_size: int = 32
     """Clips in a batch."""
     learning_rate: float = 1e-4
@@ -47,6 +50,9 @@ class TrainConfig:
     train to the end and keep the last weights."""
     frozen: tuple[str, ...] = ()
     """Networks that are not trained, such as audio_encoder."""
+    precision: str = "float32"
+    """'float32', or 'bf16': products and convolutions of the networks take bfloat16 and add up in float32, in which
+    parameters, optimisers and losses stay; faster on GPUs and on CPUs with AVX-512 or AMX for bfloat16."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
 
@@ -63,6 +69,8 @@ class TrainConfig:
         for name in counts:
             if getattr(self, name) < 1:
                 raise InputError(f"--{name.replace('_', '-')}: expected 1 or more; got {getattr(self, name)}.")
+        if any(steps < 0 for steps in self.stage_steps):
+            raise InputError(f"--stage-steps: expected 0 or more for each stage; got {self.stage_steps}.")
         for name in ("warmup_steps", "patience", "clip_norm", "clip_value", "augmentation", "device_megabytes"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise InputError(f"--{name.replace('_', '-')}: expected 0 or more; got {getattr(self, name)}.")
@@ -72,6 +80,8 @@ class TrainConfig:
             raise InputError(f"--learning-rate: expected a number above 0; got {self.learning_rate}.")
         if self.schedule not in ("constant", "cosine", "noam"):
             raise InputError(f"--schedule: expected 'constant', 'cosine' or 'noam'; got {self.schedule!r}.")
+        if self.precision not in ("float32", "bf16"):
+            raise InputError(f"--precision: expected 'float32' or 'bf16'; got {self.precision!r}.")
         if not 0 <= self.seed < 2**31:
             raise InputError(f"--seed: expected a whole number from 0 to 2147483647; got {self.seed}.")
 

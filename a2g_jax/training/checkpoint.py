@@ -15,6 +15,7 @@ from orbax.checkpoint import v1 as ocp
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import disk_full, unwritable
 from a2g_jax.training.checkpoint_files import check_files, list_path, write_list
+from a2g_jax.training.processes import is_first, of_first, together
 from a2g_jax.training.state import TrainState
 
 #: Beginnings of the names of folders that are being written and removed.
@@ -37,20 +38,28 @@ class Checkpoints:
     def save(self, state: TrainState, best: int | None = None) -> None:
         """Save the state under its step, then remove all but the latest few and the best.
 
+        Of several processes, which have a folder in common, all are to call it.
+
         Args:
             best: the step of the best checkpoint, if that is kept.
         """
         step = int(state.step)
         path = self.folder / str(step)
-        if path.exists():
+        first = is_first()
+        (exists,) = of_first([path.exists()])
+        if exists:
             return
         saving = self.folder / f"{_SAVING}{step}"
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            _check_space(self.folder, state)
-            shutil.rmtree(saving, ignore_errors=True)
+            if first:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                _check_space(self.folder, state)
+                shutil.rmtree(saving, ignore_errors=True)
+            together(f"before checkpoint {step}")
             with _quiet():
                 ocp.save(saving, state._asdict())
+            if not first:
+                return
             # A checkpoint gets its name last, when all that belongs to it is on the disk.
             write_list(saving, path)
             saving.rename(path)

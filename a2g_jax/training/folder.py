@@ -15,6 +15,8 @@ from a2g_jax.training.run_hashes import WEIGHTS_HASH, Written, check_log, writte
 LOCK = ".lock"
 #: Settings that may change on resuming, because the computation of a step does not depend on them.
 _FREE = frozenset({"checkpoint_every", "validate_every", "log_every", "keep_checkpoints", "tensorboard"})
+#: Settings that :func:`a2g_jax.training.extension.extended` compares.
+_LENGTH = frozenset({"steps", "stage_steps"})
 
 
 def check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume: bool, on_demand: bool) -> Written:
@@ -39,7 +41,7 @@ def check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume:
     ]
     if _without_name(values.get("from")) != _without_name(now.get("from")):
         changed.append(f"from: {values.get('from')}, now {now.get('from')}")
-    free_settings = _FREE if on_demand else _FREE | {"part_steps"}
+    free_settings = _FREE | _LENGTH | (frozenset() if on_demand else {"part_steps"})
     for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
         before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
         changed += [

@@ -122,3 +122,26 @@ class MetricsLog:
                 continue
         with atomic_path(self.path) as temporary:
             temporary.write_text("".join(line + "\n" for line in kept), encoding="utf-8")
+
+
+class NoLog:
+    """The log of a process that writes none, beside the one that does."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / LOG_FILE
+        self.written: dict[str, Any] = {}
+
+    def __enter__(self) -> "NoLog":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def tick(self, step: int) -> None:
+        """Nothing."""
+
+    def write(self, step: int, values: dict[str, float]) -> None:
+        """Nothing."""
+
+    def write_validation(self, step: int, values: dict[str, float]) -> None:
+        """Nothing."""

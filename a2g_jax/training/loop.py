@@ -1,23 +1,23 @@
 """The training loop: one for every model."""
 
+import hashlib
+import json
 import os
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
 
-from a2g_jax.data.batch import ClipShape, clip_shape, gather, gather_clips, gather_from_disk
-from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_others, draw_starts, find_crops
+from a2g_jax import __version__
+from a2g_jax.data.batch import ClipShape, clip_shape
+from a2g_jax.data.batches import find_crops
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_integrity import verify_corpus
-from a2g_jax.data.on_demand import Part, PartStream
+from a2g_jax.data.on_demand import PartStream
 from a2g_jax.errors import A2GError, InputError, Interrupted
 from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.io.files import make_folder
@@ -28,16 +28,22 @@ from a2g_jax.progress import say
 from a2g_jax.training.averaging import weight_average
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.checkpoint import Checkpoints, sweep_unfinished
+from a2g_jax.training.devices import Devices, find_devices
 from a2g_jax.training.dynamics import corpus_dynamics
-from a2g_jax.training.early_stopping import ended, read_metrics, validations
+from a2g_jax.training.early_stopping import Validations, ended, read_metrics, validations
+from a2g_jax.training.extension import extended
 from a2g_jax.training.fine_tuning import training_model, with_validation
 from a2g_jax.training.folder import LOCK, check_folder
-from a2g_jax.training.log import MetricsLog
-from a2g_jax.training.run import Run, RunConfig, keep_sampling, run_to_json, save_run
-from a2g_jax.training.run_hashes import write_description
+from a2g_jax.training.log import MetricsLog, NoLog
+from a2g_jax.training.processes import check_same, is_first, of_first, several, together
+from a2g_jax.training.run import Run, RunConfig, keep_sampling, load_run, run_to_json, save_run
+from a2g_jax.training.run_hashes import Written, write_description
 from a2g_jax.training.speech_range import corpus_speech_range, write_speech_range
-from a2g_jax.training.stages import StageSpan, span_at, stage_spans
-from a2g_jax.training.state import Metrics, TrainState, advance, init_state, step_keys
+from a2g_jax.training.stages import span_at, stage_spans
+from a2g_jax.training.state import TrainState, init_state
+from a2g_jax.training.steps import Steps
+from a2g_jax.training.steps import step_programs as step_programs
+from a2g_jax.training.stopping import StopVote, stop_requested
 from a2g_jax.training.validation import Validator, collect_summary
 from a2g_jax.training.vanished import ZeroGradients
 
@@ -57,6 +63,7 @@ def train(
     progress: bool = True,
     start: Params | None = None,
     verify: bool = False,
+    devices: int | str | None = None,
 ) -> Run:
     """Train a model on a corpus; the run folder can generate at any time after the first checkpoint.
 
@@ -71,6 +78,8 @@ def train(
         progress: show a progress bar on standard error.
         start: weights of the run that ``config.source`` names, for training that starts from it.
         verify: read all files of the corpus to compare their hashes, also those that seem unchanged since last time.
+        devices: how many share the clips of each batch, or ``"all"``; None for one in a single process, and all of
+            several. A run may resume on any number of them. Of several processes the first one writes.
 
     Raises:
         InputError: the folder holds a run, another run than the one to resume, or one that another process trains; a
@@ -82,12 +91,18 @@ def train(
     out = Path(out)
     settings = config.train_config
     # Errors are found before anything is written.
+    shared, first = find_devices(devices, settings.batch_size), is_first()
     verify_corpus(corpus, verify)
     model = training_model(config)
+    if resume:
+        settings, extension = extended(settings, model, out)
+        config = replace(config, train_config=settings)
+        if extension and first:
+            say(extension)
     extremes, recordings = corpus_extremes(corpus, config), corpus
     if config.source is not None:
         corpus, note = with_validation(corpus, model.clip_frames)
-        if note and progress:
+        if note and progress and first:
             say(f"{corpus.path}: {note}.")
     find_crops(corpus, "train", model.clip_frames)
     if model.needs_perceptual and config.data().perceptual is None:
@@ -100,12 +115,13 @@ def train(
         corpus.array(name)
     if settings.mirror > 0:
         pose_mirror(config.space)
-    created = not out.exists()
-    make_folder(out)
+    created = first and not out.exists()
+    if first:
+        make_folder(out)
     try:
-        with locked(out / LOCK, f"{out}: is being trained"):
+        with locked(out / LOCK, f"{out}: is being trained") if first else nullcontext():
             config = replace(config, body_extremes=extremes, speech_range=corpus_speech_range(recordings, config))
-            return _train(config, corpus, recordings, out, model, shape, resume, progress, start)
+            return _train(config, corpus, recordings, out, model, shape, resume, progress, start, shared)
     except InputError:
         # Some errors are found in a locked folder only, such as word vectors of another length.
         if created:
@@ -124,48 +140,59 @@ def _train(
     resume: bool,
     progress: bool,
     start: Params | None,
+    devices: Devices,
 ) -> Run:
     """Train in a locked folder.
 
     Args:
         recordings: the corpus with nothing of its training split held out.
     """
-    settings, extremes = config.train_config, config.body_extremes
+    settings, extremes, first = config.train_config, config.body_extremes, is_first()
     spans = stage_spans(model, settings)
     total = spans[-1].stop
     checkpoints = Checkpoints(out / "checkpoints", settings.keep_checkpoints)
-    before = check_folder(out, config, checkpoints, resume, corpus.on_demand)
-    sweep(out)
-    sweep_unfinished(checkpoints.folder)
+    before = Written()
+    if first:
+        before = check_folder(out, config, checkpoints, resume, corpus.on_demand)
+        sweep(out)
+        sweep_unfinished(checkpoints.folder)
+    check_same("other settings or another corpus", _digest(config))
+    resume = bool(*of_first([resume and bool(checkpoints.steps())]))
     state = init_state(model, spans, settings.seed, start)
-    restored = checkpoints.restore(state) if resume else None
-    if restored is not None:
+    if not resume and start is None and model.use_words is not None:
+        state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
+    state = devices.first_copies(state)
+    if resume:
+        restored = checkpoints.restore(state)
+        assert restored is not None
         state = restored
         config = keep_sampling(config, out)
-    elif start is None and model.use_words is not None:
-        state = state._replace(params=model.use_words(state.params, corpus.vocabulary))
     done = int(state.step)
     config = replace(config, body_extremes=extremes)
-    average = weight_average(config.source, model.stages, start, out, restored is not None)
-    description = run_to_json(config, done)
-    # Without the hash of a log from which lines are about to be removed.
-    write_description(out, description, before._replace(log=None))
-    write_speech_range(out, config.speech_range)
+    average: _Average = lambda params: params  # noqa: E731
+    if first:
+        average = weight_average(config.source, model.stages, start, out, resume)
+        description = run_to_json(config, done)
+        # Without the hash of a log from which lines are about to be removed.
+        write_description(out, description, before._replace(log=None))
+        write_speech_range(out, config.speech_range)
     with (
-        _stop_requested() as stop,
+        stop_requested() as stop,
         PartStream(corpus, settings.part_steps, total, arrays=shape.arrays) as parts,
-        MetricsLog(out, done, settings, progress, total) as log,
+        MetricsLog(out, done, settings, progress, total) if first else NoLog(out) as log,
     ):
-        write_description(out, description, before._replace(log=log.written))
-        export = partial(_export, config, model, corpus, out, average, log)
+        if first:
+            write_description(out, description, before._replace(log=log.written))
+        export = partial(_export, config, model, corpus, out, average, log, devices)
         run = None
-        steps, zeros = _Steps(config, shape), ZeroGradients(out)
+        steps, zeros, stops = Steps(config, shape, devices), ZeroGradients(out), StopVote(stop, devices)
         validate = Validator(model, corpus, config)
         ends = {span.stop for span in spans}
-        checked = validations(read_metrics(log.path), spans[-1].first, done)
+        checked = _of_first(validations(read_metrics(log.path), spans[-1].first, done))
         while done < total and not ended(settings, checked):
             span = span_at(spans, done)
-            part = parts.get(done, stop)
+            # One of several processes does not stop alone.
+            part = parts.get(done, None if several() else stop)
             if part is None:
                 checkpoints.save(state, checked.best if settings.patience else None)
                 export(state)
@@ -176,96 +203,50 @@ def _train(
                 values = {name: float(value) for name, value in jax.device_get(metrics).items()}
                 _check_finite(state, done, values, checkpoints)
                 log.write(done, values)
-                zeros.note(done, values)
+                zeros.note(done, values if first else {})
             else:
                 log.tick(done)
             if done % settings.validate_every == 0 or done in ends:
-                found = validate(average(state.params), span.stage)
+                found = validate(average(devices.host(state.params)), span.stage) if first else {}
                 log.write_validation(done, found)
                 if found and span is spans[-1]:
                     checked = checked.after(done, found["loss"])
+                checked = _of_first(checked)
+            stopping = stops()
             better = settings.patience > 0 and checked.best == done
-            if done % settings.checkpoint_every == 0 or done in ends or better or stop.is_set():
+            if done % settings.checkpoint_every == 0 or done in ends or better or stopping:
                 _check_finite(state, done, {}, checkpoints)
                 checkpoints.save(state, checked.best if settings.patience else None)
                 run = export(state)
-            if stop.is_set():
+            if stopping:
                 raise _interrupted(out, done, total)
     if settings.patience and checked.best not in (None, int(state.step)):
         best = checkpoints.restore(state, checked.best)
         assert best is not None
-        return export(best, recordings)
+        run = export(best, recordings)
     # A finished run may lack its weights, if it was killed while writing them.
-    adapts = config.source is not None and config.source.dynamics
-    return export(state, recordings) if run is None or adapts else run
+    elif run is None or (config.source is not None and config.source.dynamics):
+        run = export(state, recordings)
+    together("trained")
+    return load_run(out) if run is None else run
+
+
+def _digest(config: RunConfig) -> bytes:
+    """A hash of what all processes have to agree on."""
+    description = json.dumps([__version__, run_to_json(config, 0)], sort_keys=True)
+    return hashlib.sha256(description.encode()).digest()
+
+
+def _of_first(checked: Validations) -> Validations:
+    """The validations of the first process, which alone has their losses."""
+    if not several():
+        return checked
+    best, since = of_first([-1 if checked.best is None else checked.best, checked.since])
+    return checked._replace(best=None if best < 0 else best, since=since)
 
 
 def _interrupted(out: Path, done: int, total: int) -> Interrupted:
     return Interrupted(f"{out}: stopped after step {done} of {total}; resume with --resume.")
-
-
-#: A whole step of training.
-_Step = Callable[[TrainState], tuple[TrainState, Metrics]]
-
-
-class _Steps:
-    """Steps on the parts of a corpus; parts with recordings of the same lengths share compiled programs."""
-
-    def __init__(self, config: RunConfig, shape: ClipShape) -> None:
-        self._config, self._shape = config, shape
-        self._programs: dict[tuple[Any, ...], Callable[[Any], _Step]] = {}
-        self._last: tuple[StageSpan, Part, _Step] | None = None
-
-    def of(self, span: StageSpan, part: Part) -> _Step:
-        """The step of a stage on a part; kept until another one is requested."""
-        if self._last is None or self._last[0] is not span or self._last[1] is not part:
-            crops = crops_in(part.segments, self._shape.frames, "the longest recording of a part")
-            key = (span.stage.name, *(np.asarray(array).tobytes() for array in crops))
-            if key not in self._programs:
-                self._programs[key] = step_programs(span, self._shape, crops, self._config)
-            self._last = None  # frees the part before, before the next one is put on the device
-            self._last = span, part, self._programs[key](part)
-        return self._last[2]
-
-
-def step_programs(span: StageSpan, shape: ClipShape, crops: Crops, config: RunConfig) -> Callable[[Part], _Step]:
-    """A function from parts to whole steps: choose clips, augment, compute, update; the same for data on disk."""
-    settings = config.train_config
-    mirror_pose = pose_mirror(config.space) if settings.mirror > 0 else None
-    make_batch = BatchMaker(config.statistics["audio"], settings.augmentation, settings.mirror, mirror_pose)
-
-    def finish(state: TrainState, clips: dict[str, Any]) -> tuple[TrainState, Metrics]:
-        _, augment_key, model_key = step_keys(state.key, state.step)
-        return advance(span, state, make_batch(augment_key, clips), model_key)
-
-    def starts(state: TrainState):
-        key = step_keys(state.key, state.step)[0]
-        chosen = draw_starts(key, crops, settings.batch_size)
-        return chosen, draw_others(jax.random.fold_in(key, 0), crops, chosen) if shape.paired else None
-
-    @partial(jax.jit, donate_argnums=0)
-    def on_device(state: TrainState, arrays: dict[str, Any]):
-        chosen, others = starts(state)
-        return finish(state, gather_clips(arrays, shape, chosen, gather, others))
-
-    choose = jax.jit(starts)
-    compute = jax.jit(finish, donate_argnums=0)
-
-    def on(part: Part) -> _Step:
-        size = sum(array.nbytes for array in part.arrays.values()) / 1e6
-        # Rows of the device are counted in 32 bits.
-        if size <= settings.device_megabytes and max(len(array) for array in part.arrays.values()) < 2**31:
-            arrays = {name: jax.device_put(np.asarray(array)) for name, array in part.arrays.items()}
-            return lambda state: on_device(state, arrays)
-
-        def from_disk(state: TrainState) -> tuple[TrainState, Metrics]:
-            chosen, others = jax.tree.map(np.asarray, choose(state))
-            clips = gather_clips(part.arrays, shape, chosen, gather_from_disk, others)
-            return compute(state, clips)
-
-        return from_disk
-
-    return on
 
 
 def _check_finite(state: TrainState, step: int, values: dict[str, float], checkpoints: Checkpoints) -> None:
@@ -286,38 +267,21 @@ def _export(
     corpus: Corpus,
     out: Path,
     average: _Average,
-    log: MetricsLog,
+    log: MetricsLog | NoLog,
+    devices: Devices,
     state: TrainState,
     recordings: Corpus | None = None,
-) -> Run:
-    """Write weights and the latent summary to the run folder, for generation.
+) -> Run | None:
+    """Write weights and the latent summary to the run folder, for generation; of several processes the first one does.
 
     Args:
         recordings: of a finished training, whose dynamics its motion takes on if the run says so.
     """
-    params = jax.device_get(finished(model, average(state.params)))
+    if not is_first():
+        return None
+    params = jax.device_get(finished(model, average(devices.host(state.params))))
     summary = collect_summary(model, params, corpus, config)
     dynamics = None if recordings is None else corpus_dynamics(model, config, params, summary, recordings)
     run = Run(config, params, summary, int(state.step), dynamics)
     save_run(out, run, log.written)
     return run
-
-
-@contextmanager
-def _stop_requested() -> Iterator[threading.Event]:
-    """An event that SIGINT and SIGTERM set, so that a step is never interrupted; a second signal ends at once."""
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-
-    def stop(number: int, _frame: Any) -> None:
-        event.set()
-        signal.signal(number, before[signal.Signals(number)])
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield event
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

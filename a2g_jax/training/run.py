@@ -89,6 +89,7 @@ def run_to_json(config: RunConfig, steps: int) -> dict[str, Any]:
         "feature_network": None if config.perceptual is None else config.perceptual.fingerprint,
         "body_extremes": None if config.body_extremes is None else extremes_to_json(config.body_extremes),
         **({} if config.source is None else {"from": asdict(config.source)}),
+        **({} if config.settings_file is None else {"settings_file": dict(config.settings_file)}),
     }
 
 
@@ -135,6 +136,7 @@ def load_run(folder: str | os.PathLike[str], check_shapes: bool = True) -> Run:
             corpus=values["corpus"],
             perceptual=Perceptual(values["feature_network"]) if values.get("feature_network") else None,
             source=from_json(Source, values["from"], str(about)) if values.get("from") else None,
+            settings_file=stored_file(values),
         )
         if values.get("body_extremes") is not None:
             where = f"{about}: body_extremes"
@@ -163,6 +165,12 @@ def load_run(folder: str | os.PathLike[str], check_shapes: bool = True) -> Run:
     _check_params(weights, config.build() if check_shapes else None, params)
     summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
     return Run(config, params, summary, steps, dynamics)
+
+
+def stored_file(values: Mapping[str, Any]) -> dict[str, str] | None:
+    """What a run's description has of the file of its settings."""
+    found = values.get("settings_file")
+    return {str(name): str(text) for name, text in found.items()} if isinstance(found, dict) else None
 
 
 def demo_run() -> Run:

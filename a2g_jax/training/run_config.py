@@ -1,6 +1,6 @@
 """The description of a run, and a trained model with it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -86,6 +86,8 @@ class RunConfig:
     """The run that training started from; None for initial weights."""
     speech_range: SpeechRange | None = None
     """The range of the training split's speech, in a file of its own beside ``run.json``; None if not measured."""
+    settings_file: Mapping[str, str] | None = None
+    """Name, SHA-256 and text of the file that settings were read from, where there was one; flags override it."""
 
     @property
     def entry(self) -> Entry:

@@ -47,10 +47,14 @@ def stage_spans(model: Model, config: TrainConfig) -> tuple[StageSpan, ...]:
                 f"{model.name}, stage {stage.name}: trains {', '.join(sorted(unknown))}; the parameters are"
                 f" {', '.join(sorted(parameters))}."
             )
+    if config.stage_steps and len(config.stage_steps) != len(names):
+        raise InputError(
+            f"--stage-steps: expected {len(names)} numbers, for {', '.join(names)}; got {len(config.stage_steps)}."
+        )
+    lengths = config.stage_steps or [config.steps if stage.steps is None else stage.steps for stage in model.stages]
     spans: list[StageSpan] = []
     first = 0
-    for stage in model.stages:
-        steps = config.steps if stage.steps is None else stage.steps
+    for stage, steps in zip(model.stages, lengths, strict=True):
         spans.append(StageSpan(stage, first, replace(config, steps=steps)))
         first += steps
     return tuple(spans)

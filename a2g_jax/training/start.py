@@ -1,5 +1,6 @@
 """Starting a training from the paths of a corpus and a feature network."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from a2g_jax.training.checkpoint import Checkpoints
 from a2g_jax.training.fine_tuning import check_fits, start_from, tuned_config
 from a2g_jax.training.loop import train
 from a2g_jax.training.perceptual import load_perceptual
-from a2g_jax.training.run import Run, RunConfig, load_run, open_run
+from a2g_jax.training.run import Run, RunConfig, load_run, open_run, stored_file
 from a2g_jax.training.run_file import RUN_FILE, WEIGHTS_FILE, read_description, run_folder
 
 
@@ -28,6 +29,8 @@ def run_training(
     features: str | Path | None = None,
     source: str | None = None,
     verify: bool = False,
+    devices: int | str | None = None,
+    settings_file: Mapping[str, str] | None = None,
 ) -> Run:
     """Train a model from the paths of a corpus, a feature network and a run to start from.
 
@@ -41,12 +44,16 @@ def run_training(
         source: a run folder, or a shipped run, whose weights the training starts from. It is not needed to resume:
             what is kept of it is stored in ``out`` with the first checkpoint.
         verify: read all files of the corpus to compare their hashes, see :func:`~a2g_jax.training.loop.train`.
+        devices: how many share the clips of each batch, see the same.
+        settings_file: what the run records of a file of settings; a resumed run keeps its own if None.
 
     Raises:
         InputError: a corpus, run or feature network that cannot be used, or recordings that do not fit the source.
         Interrupted: by a signal, after saving the state.
     """
     opened = Corpus.open(corpus)
+    if settings_file is None and resume and (Path(out) / RUN_FILE).is_file():
+        settings_file = stored_file(read_description(Path(out)))
     perceptual = None if features is None else load_perceptual(features, opened)
     stored = _stored_source(Path(out)) if resume else None
     if stored is not None and _has_begun(Path(out)):
@@ -61,22 +68,23 @@ def run_training(
             sampling=before.config.sampling,
             body_extremes=before.config.body_extremes,
             source=before.config.source,
+            settings_file=settings_file,
         )
         # The checkpoint replaces these parameters.
-        return train(config, opened, out, resume=True, start=before.params, verify=verify)
+        return train(config, opened, out, resume=True, start=before.params, verify=verify, devices=devices)
     if source is None and stored is not None:
         source = stored["run"]
     if source is None:
-        config = RunConfig.of(name, preset, model, training, opened, perceptual)
-        return train(config, opened, out, resume=resume, verify=verify)
+        config = replace(RunConfig.of(name, preset, model, training, opened, perceptual), settings_file=settings_file)
+        return train(config, opened, out, resume=resume, verify=verify, devices=devices)
     start = start_from(source, open_run(source))
-    config = tuned_config(start, model, training, opened, perceptual)
+    config = replace(tuned_config(start, model, training, opened, perceptual), settings_file=settings_file)
     if config.sampling != start.run.config.sampling:
         say(
             f"{out}: gains of controls are not taken from {source}, whose weights they were measured on; measure those"
             f" of the new weights with 'python -m experiments.controls {out} --store'."
         )
-    return train(config, opened, out, resume=resume, start=start.run.params, verify=verify)
+    return train(config, opened, out, resume=resume, start=start.run.params, verify=verify, devices=devices)
 
 
 def _stored_source(out: Path) -> dict[str, Any] | None:

@@ -1,6 +1,7 @@
 """The state of a training run and the step that advances it."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -12,6 +13,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.models.base import Loss, Model, Params, Stage, Update
 from a2g_jax.models.optimiser import make_optimiser
 from a2g_jax.models.train_config import TrainConfig
+from a2g_jax.training.precision import half_products
 from a2g_jax.training.stages import StageSpan
 
 
@@ -90,13 +92,17 @@ def advance(span: StageSpan, state: TrainState, batch: Batch, key: Key[Array, ""
     if (warm_start := stage.warm_start) is not None:
         params = jax.lax.cond(step == 0, lambda p: warm_start(p, batch), lambda p: p, params)
     good, total = state.good, jnp.zeros(())
+    compute: Callable[..., Any]
     metrics: Metrics = {}
     optimisers = dict(state.optimisers)
     single = len(stage.updates) == 1
     for number, update in enumerate(stage.updates):
         own = key if single else jax.random.fold_in(key, number)
         params, name = dict(params), optimiser_name(stage, update)
-        (loss, terms), gradient = _gradient(update, params, own, batch, step)
+        compute = partial(_gradient, update)
+        if span.config.precision == "bf16":
+            compute = half_products(compute)
+        (loss, terms), gradient = compute(params, own, batch, step)
         norm = optax.global_norm(gradient)
         good &= jnp.isfinite(loss) & jnp.isfinite(norm)
         part = trained(update, params)

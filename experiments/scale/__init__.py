@@ -1,0 +1,1 @@
+"""What the papers' trainings cost, on this machine and on others."""
