@@ -1,5 +1,7 @@
 """What every test shares: strict JAX, two devices, keys, and the real recordings where they are."""
 
+import contextlib
+import ctypes
 import gc
 import os
 from importlib.metadata import version
@@ -24,19 +26,40 @@ from jaxtyping import install_import_hook
 jax.config.update("jax_numpy_rank_promotion", "raise")
 _HOOK = install_import_hook("a2g_jax", "beartype.beartype")
 
+# Tracing makes many small objects beside a large heap: at Python's thresholds, a third of it is the search for cycles.
+gc.set_threshold(20_000, 10, 10)
 
 #: Memory of a worker, bytes, from which compiled programs are dropped: with all of the suite it would pass 5 GB.
 _MOST_MEMORY = 2.5e9
+#: What it may grow by until they are dropped again, where the allocator keeps the memory of dropped programs.
+_GROWTH = 0.5e9
+
+
+def _resident() -> float:
+    """Memory of this process, bytes; zero where the system does not state it."""
+    statm = Path("/proc/self/statm")
+    return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if statm.exists() else 0.0
+
+
+@pytest.fixture(scope="session")
+def memory_limit():
+    """Memory at which programs are dropped next; one number in a list, as it rises."""
+    return [_MOST_MEMORY]
 
 
 @pytest.fixture(autouse=True, scope="module")
-def bounded_memory():
-    """Drops compiled programs between modules where they take much memory; the cache on disk still has them."""
+def bounded_memory(memory_limit):
+    """Drops compiled programs between modules where memory has grown much; the cache on disk has the large ones.
+
+    To drop them is dear: the modules after it compile anew what they share, and the search for cycles takes a second.
+    """
     yield
-    statm = Path("/proc/self/statm")
-    if statm.exists() and int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") > _MOST_MEMORY:
+    if _resident() > memory_limit[0]:
         jax.clear_caches()
         gc.collect()
+        with contextlib.suppress(OSError, AttributeError):  # not glibc
+            ctypes.CDLL(None).malloc_trim(0)
+        memory_limit[0] = max(_MOST_MEMORY, _resident() + _GROWTH)
 
 
 @pytest.fixture

@@ -15,10 +15,11 @@ from a2g_jax.errors import InputError
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
-from a2g_jax.models.base import Model, finished
+from a2g_jax.models.base import Model
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual, Run, RunConfig, Source
 from a2g_jax.training.run_file import WEIGHTS_FILE, run_folder
+from a2g_jax.training.shapes import parameter_shapes
 
 #: Standard deviation up to which a value of a run's poses counts as constant: the lower bound of a corpus's.
 _CONSTANT = 0.01
@@ -148,10 +149,8 @@ def adapted_statistics(
 def _check_networks(config: RunConfig, run: Run, corpus: Corpus) -> None:
     """Refuse settings or labels with which the weights would be those of other networks."""
     model = config.build()
-    expected = flatten_dict(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0)), sep="/")
-    found = flatten_dict(run.params, sep="/")
-    shapes = lambda arrays: {name: tuple(array.shape) for name, array in arrays.items()}  # noqa: E731
-    if shapes(expected) != shapes(found):
+    found = {name: tuple(array.shape) for name, array in flatten_dict(run.params, sep="/").items()}
+    if parameter_shapes(config) != found:
         assert config.source is not None
         changed = [
             f"--{field.name.replace('_', '-')}"

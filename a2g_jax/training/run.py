@@ -20,7 +20,7 @@ from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.io.files import atomic_path, sha256_file
 from a2g_jax.metrics.body.bounds import extremes_from_json, extremes_to_json
-from a2g_jax.models.base import Model, Params, finished
+from a2g_jax.models.base import Params
 from a2g_jax.models.registry import find_trained_model
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.run_config import Perceptual as Perceptual
@@ -39,6 +39,7 @@ from a2g_jax.training.run_file import (
     split_settings,
 )
 from a2g_jax.training.run_hashes import Written, read_weights, write_description, write_exchange
+from a2g_jax.training.shapes import parameter_shapes
 from a2g_jax.training.speech_range import read_speech_range
 
 
@@ -162,7 +163,7 @@ def load_run(folder: str | os.PathLike[str], check_shapes: bool = True) -> Run:
     params = unflatten_dict(
         {name.removeprefix("params/"): array for name, array in arrays.items() if name.startswith("params/")}, sep="/"
     )
-    _check_params(weights, config.build() if check_shapes else None, params)
+    _check_params(weights, parameter_shapes(config) if check_shapes else None, params)
     summary = {name.removeprefix("summary/"): array for name, array in arrays.items() if name.startswith("summary/")}
     return Run(config, params, summary, steps, dynamics)
 
@@ -201,19 +202,15 @@ def keep_sampling(config: RunConfig, folder: Path) -> RunConfig:
     return replace(config, sampling=from_json(config.entry.sampling, sampling, str(about)))
 
 
-def _check_params(weights: Path, model: Model | None, params: Params) -> None:
-    """Compare shapes with the model's own, where one is given, before anything is computed; refuse NaN."""
-    import jax
-
+def _check_params(weights: Path, expected: dict[str, tuple[int, ...]] | None, params: Params) -> None:
+    """Compare shapes with the model's own, where they are given, before anything is computed; refuse NaN."""
     found = flatten_dict(params, sep="/")
-    expected = found
-    if model is not None:
-        shapes = jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0))
-        expected = flatten_dict(shapes, sep="/")
+    if expected is None:
+        expected = {name: tuple(array.shape) for name, array in found.items()}
     for name in sorted({*expected, *found}):
-        want, got = expected.get(name), found.get(name)
-        if want is None or got is None or want.shape != got.shape:
-            shape = lambda array: "nothing" if array is None else tuple(array.shape)  # noqa: E731
-            raise InputError(f"{weights}: {name}: expected {shape(want)}; got {shape(got)}; it is of another model.")
+        want, got = expected.get(name, "nothing"), found.get(name)
+        shape = "nothing" if got is None else tuple(got.shape)
+        if got is None or want != shape:
+            raise InputError(f"{weights}: {name}: expected {want}; got {shape}; it is of another model.")
         if not np.all(np.isfinite(got)):
             raise InputError(f"{weights}: {name} holds NaN or infinity; restore it or train again.")

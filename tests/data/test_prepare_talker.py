@@ -21,8 +21,8 @@ def short(monkeypatch):
 
 def test_any_number_of_workers_makes_the_same_corpus(tmp_path, short):
     options = TalkerOptions(minutes=0.3, seed=7, jitter=1.0)
-    made = [contents(prepare_talker(tmp_path / str(n), options, workers=n).path) for n in (1, 2, 3)]
-    assert made[0] == made[1] == made[2]
+    made = [contents(prepare_talker(tmp_path / str(n), options, workers=n).path) for n in (1, 3)]
+    assert made[0] == made[1]
     assert len(made[0]) == 5 + 6
 
 

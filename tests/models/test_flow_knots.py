@@ -1,6 +1,7 @@
 """The flow on knots of a spline: windows, latents, constant channels, removal of noise, hidden conditioning."""
 
 from dataclasses import replace
+from functools import cache
 
 import jax
 import jax.numpy as jnp
@@ -62,13 +63,19 @@ def batch_of(clips=4, frames=120, seed=0):
     return Batch(jnp.asarray(audio), jnp.asarray(pose), other_pose=jnp.asarray(pose[::-1]))
 
 
-def fitted(config=CONFIG, sampling=AS_DRAWN):
-    """A model, and parameters whose couplings are not the identity."""
-    model = build(config, DATA, sampling)
+@cache
+def fitted_params(config):
+    """Parameters on the host, whose couplings are not the identity; fitted once for each configuration."""
+    model = build(config, DATA, AS_DRAWN)
     params = jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch_of())
     kernel = params["glow"]["coupling"]["out_kernel"]
     params["glow"]["coupling"]["out_kernel"] = 0.2 * jax.random.normal(jax.random.key(1), kernel.shape)
-    return model, params
+    return jax.device_get(params)
+
+
+def fitted(config=CONFIG, sampling=AS_DRAWN):
+    """A model, and parameters whose couplings are not the identity; how it is sampled is no part of them."""
+    return build(config, DATA, sampling), jax.tree.map(jnp.asarray, fitted_params(config))
 
 
 def test_any_windows_give_the_same_motion():

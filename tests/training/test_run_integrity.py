@@ -22,7 +22,8 @@ from a2g_jax.training import loop, run_hashes
 from a2g_jax.training.checkpoint import Checkpoints
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import load_run, save_run
-from a2g_jax.training.run_file import SHIPPED, run_folder
+from a2g_jax.training.run_file import SHIPPED
+from a2g_jax.training.run_file import run_folder as shipped_folder
 from a2g_jax.training.state import TrainState
 from a2g_jax.training.vanished import zero_gradient
 from tests.disk_for_tests import small_files
@@ -265,20 +266,19 @@ def test_a_corpus_that_changes_under_a_training_is_one_error(toy_corpus, trained
 
 
 @pytest.mark.slow
-def test_a_full_disk_while_training(toy_corpus, trained, tmp_path):
-    """At the log, the weights or a checkpoint: one line, and after it the training resumes to the same end."""
+@pytest.mark.parametrize("largest", [pytest.param(600, marks=pytest.mark.slow), 9000, None])
+def test_a_full_disk_while_training(toy_corpus, trained, tmp_path, largest):
+    """At the log, a checkpoint or the weights: one line, and after it the training resumes to the same end."""
     config = trained[1]
-    whole = load_run(trained[0])
+    whole, out = load_run(trained[0]), tmp_path / "run"
     weights = (trained[0] / "weights.safetensors").stat().st_size
-    for size in (600, 9000, weights - 10):
-        out = tmp_path / f"run{size}"
-        with pytest.raises(OutputError, match="cannot be written .*File too large"), small_files(size):
-            train(config, toy_corpus, out, resume=False, progress=False)
-        assert not [path for path in out.rglob("*") if "a2g-" in path.name or "saving" in path.name]
-        resumed = train(config, toy_corpus, out, resume=True, progress=False)
-        assert all(jax.tree.leaves(jax.tree.map(lambda a, b: bool(np.array_equal(a, b)), whole.params, resumed.params)))
-        assert (out / "metrics.jsonl").read_text() == (trained[0] / "metrics.jsonl").read_text()
-        assert names(out) == names(trained[0])
+    with pytest.raises(OutputError, match="cannot be written .*File too large"), small_files(largest or weights - 10):
+        train(config, toy_corpus, out, resume=False, progress=False)
+    assert not [path for path in out.rglob("*") if "a2g-" in path.name or "saving" in path.name]
+    resumed = train(config, toy_corpus, out, resume=True, progress=False)
+    assert all(jax.tree.leaves(jax.tree.map(lambda a, b: bool(np.array_equal(a, b)), whole.params, resumed.params)))
+    assert (out / "metrics.jsonl").read_text() == (trained[0] / "metrics.jsonl").read_text()
+    assert names(out) == names(trained[0])
 
 
 def lines(*norms):
@@ -342,4 +342,4 @@ def test_values_of_other_types_in_run_json_are_one_line_with_its_name(run_folder
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shapes_of_the_weights_of_the_package_are_right(name):
     """They are not compared whenever one opens them, which takes a second."""
-    load_run(run_folder(name), check_shapes=True)
+    load_run(shipped_folder(name), check_shapes=True)
