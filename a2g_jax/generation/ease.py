@@ -2,7 +2,8 @@
 
 Angles near a bound are compressed smoothly: those further than a few degrees inside it stay as they are, and none
 passes it. The correction is whole in the frames of a finding, fades to zero before and after them, and is zero from
-the border of a stretch on that has to stay. A motion without findings is not touched.
+the border of a stretch on that has to stay. Turns that are too fast are bridged by slower ones
+(:mod:`a2g_jax.geometry.turns`). A motion without findings is not touched.
 """
 
 from collections.abc import Iterable
@@ -14,6 +15,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.turns import bridged
 from a2g_jax.metrics.body.bounds import BodyBounds
 from a2g_jax.metrics.body.check import BodyFinding, Stretch
 
@@ -24,13 +26,14 @@ _BEGIN, _END = 17.0, 2.0
 _WHOLE, _FADE = 0.25, 0.5
 #: Body joints that are eased; legs are not, since feet that stand would move.
 _ARM = ("Collar", "Shoulder", "Elbow", "Wrist")
+_FIGURES = {"bend": "bend", "backwards": "bend", "range": "range", "turn": "turn"}
 _EASED = {"Spine1", "Spine2", "Spine3", "Neck", "Head", *(f"{side}_{part}" for side in "LR" for part in _ARM)}
 
 
 def ease(
     motion: Motion, findings: Iterable[BodyFinding], bounds: BodyBounds, stretches: Iterable[Stretch] = ()
 ) -> Motion:
-    """The motion with the joints of findings on ``bend``, ``backwards`` and ``range`` within their bounds.
+    """The motion with the joints of findings on ``bend``, ``backwards``, ``range`` and ``turn`` within their bounds.
 
     Args:
         findings: on the motion. Those on legs and on other figures remain, since they need another motion; so do frames
@@ -46,11 +49,17 @@ def ease(
         fixed[max(stretch.first, 0) : max(stretch.stop, 0)] = True
     found: dict[tuple[str, str], Bool[np.ndarray, " T"]] = {}
     for one in findings:
-        role, figure = roles.get(one.joint), "range" if one.figure == "range" else "bend"
-        if role in _EASED and one.figure in ("bend", "backwards", "range"):
+        role, figure = roles.get(one.joint), _FIGURES.get(one.figure)
+        if role in _EASED and figure is not None:
             found.setdefault((figure, role), np.zeros(motion.frames, bool))[one.first : one.stop] = True
     rotations = np.asarray(motion.rotations, np.float64).copy()
     for (figure, role), outside in sorted(found.items(), key=lambda item: item[0]):
+        if figure == "turn":
+            # Last by its name: joints that are turned too far may be eased back to either side.
+            joint = reference.joints[role]
+            limits = bounds.high["turn"][joint], bounds.high["range"][joint]
+            rotations[:, joint] = bridged(rotations[:, joint], reference.pose[joint], *limits, motion.fps, fixed)
+            continue
         weight = _weight(outside & ~fixed, fixed, motion.fps)
         rows = weight > 0.0
         joint = reference.joints[role]
