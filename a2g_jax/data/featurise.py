@@ -129,7 +129,11 @@ def prepare_recording(
         emotion=recording.emotion,
         split=split,
         sources=recording.sources,
-        annotations={"words": [asdict(word) for word in recording.words], **recording.annotations},
+        annotations={
+            "words": [asdict(word) for word in recording.words],
+            **({"motion_fps": float(recording.motion.fps)} if recording.sources else {}),
+            **recording.annotations,
+        },
         notes=notes,
     )
 

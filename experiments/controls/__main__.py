@@ -28,9 +28,11 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge
 from a2g_jax.features.hand_properties import PROPERTIES
+from a2g_jax.generation.controls import controls_of
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import read_json, write_json
 from a2g_jax.io.sealed import read_sealed, write_sealed
+from a2g_jax.models.control_curves import parse_gain
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import RUN_FILE, run_folder
@@ -85,7 +87,7 @@ def main() -> None:
             "draws": options.draws,
             "seed": options.seed,
             "intervals": "Student's t",
-            "gains": list(run.config.sampling_settings.control_gains),
+            "gains": list(getattr(run.config.sampling_settings, "control_gains", ())),
             "judge": judge.fingerprint if judge is not None and emotions else None,
         }
         figures["runs"][_named(name)] = found
@@ -109,6 +111,8 @@ def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Names
         print(f"{name}: {control} responds by {slope:.2f}; gain {gain:.2f}")
         if gain > 1.0:
             lines.append(f"{control}={gain:.2f}")
+    categories = controls_of(run).categories
+    lines += [line for line in run.config.sampling_settings.control_gains if parse_gain(line)[0] in categories]
     about = run_folder(name) / RUN_FILE
     values = read_sealed(about)
     values["sampling"] |= {"control_gains": lines}

@@ -78,7 +78,8 @@ def page(found: dict[str, Any], run: str) -> str:
         lines += [
             f"## {label}",
             "",
-            f"Classified as requested: **{scores['requested_accuracy']['mean']:.2f}**{ends} (chance {1 / len(names):.3f});"
+            f"Classified as requested: **{scores['requested_accuracy']['mean']:.2f}**{ends}"
+            f" (chance {1 / len(names):.3f});"
             f" where the speech has another emotion: {scores['requested_other_accuracy']['mean']:.2f}.",
             "",
             f"| requested | {' | '.join(names)} | above neutral |",

@@ -22,7 +22,7 @@ class EmotionGestureSampling:
     temperature: float = 1.0
     """Scale of the noise that emotion features are sampled from; 1 is that of training."""
     controls: tuple[str, ...] = field(default=(), metadata={"flag": "control", "repeat": True})
-    """Requested emotion as other runs take it: 'emotion=anger', or over seconds 'emotion=neutral@0,anger@12.5'; the same
+    """Requested emotion, as other runs take it: 'emotion=anger', over seconds 'emotion=neutral@0,anger@12.5'; the same
     as the setting ``emotion`` with these values, and only one of both can be given."""
     seam_frames: int = 10
     """Frames after a seam between chunks over which the offset at it fades out; 0 leaves the seams as generated."""
