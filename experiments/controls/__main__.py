@@ -56,6 +56,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the motions (default: %(default)s)")
     parser.add_argument("--judge", help="a run of emotion_classifier; without it, emotions are not measured")
     parser.add_argument("--judge-corpus", type=Path, help="the corpus of the judge (needed with --judge)")
+    parser.add_argument("--only-emotions", action="store_true", help="keep the other figures that are there")
     parser.add_argument("--store", action="store_true", help="measure gains and store them in the runs first")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     options = parser.parse_args()
@@ -74,9 +75,10 @@ def main() -> None:
         emotions = run.config.data().emotions if judge is not None and _has_emotion(run) else ()
         if judge is not None and emotions:
             figures |= {"emotions": list(emotions), "true_emotions": true_confusion(judge, emotions)}
-        total = 1 + len(subject.names) * (len(QUANTILES) + 1) + len(emotions)
+        before = figures["runs"].get(_named(name)) if options.only_emotions else None
+        total = len(emotions) + (1 + len(subject.names) * (len(QUANTILES) + 1) if before is None else 0)
         with progress_bar(total, f"measuring {_named(name)}", "request") as bar:
-            found = responses(subject, _spread(run, speeches), lambda: bar.update(1))
+            found = before or responses(subject, _spread(run, speeches), lambda: bar.update(1))
             if judge is not None and emotions:
                 found["emotions"] = confusion(subject, judge, emotions, lambda: bar.update(1))
         found["about"] = {

@@ -18,7 +18,7 @@ GROUPS = {
     "jerk": ("jerk_p50", "jerk_p90"),
     "posture": ("posture",),
 }
-_TUNED, _RIVALS = "fine-tuned", ("shipped", "from scratch")
+_TUNED, _RIVALS = "fine-tuned", ("shipped", "from scratch", "from scratch with dynamics")
 #: Distances of a record by group, and ``all``.
 Distances = dict[str, float]
 

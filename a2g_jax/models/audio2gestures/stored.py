@@ -111,7 +111,7 @@ def emotion_shift(
     number = jnp.nan_to_num(label).astype(int)
     own = (labels[None] == number[:, None]).astype(codes.dtype)
     means = own @ codes / jnp.maximum(own.sum(axis=1, keepdims=True), 1.0)
-    shift = (gain - 1.0) * (means - jnp.mean(codes, axis=0))
+    shift = (gain - 1.0) * (means - jnp.mean(codes, axis=0)[None])
     return jnp.where(jnp.isnan(label)[:, None] | (own.sum(axis=1, keepdims=True) == 0), 0.0, shift)
 
 
