@@ -43,6 +43,8 @@ from experiments.controls.subject import SECONDS, Ruler, Subject, column
 from experiments.controls.table import render
 from experiments.motion.speeches import SEED, Speech, Talk, held_out_talk
 
+#: The control with a gain that is chosen on other speeches, with ``--talk-seed`` and ``--emotion-gain``.
+EMOTION = "emotion"
 #: Largest gain: beyond it, all requests but those near the median would be for the extreme clips.
 MOST = 2.5
 
@@ -56,13 +58,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the motions (default: %(default)s)")
     parser.add_argument("--judge", help="a run of emotion_classifier; without it, emotions are not measured")
     parser.add_argument("--judge-corpus", type=Path, help="the corpus of the judge (needed with --judge)")
+    parser.add_argument("--talk-seed", type=int, default=SEED, help="of the speeches (default: %(default)s)")
+    parser.add_argument(
+        "--emotion-gain", type=float, metavar="G", help="another gain of the control emotion; give --out"
+    )
     parser.add_argument("--only-emotions", action="store_true", help="keep the other figures that are there")
     parser.add_argument("--store", action="store_true", help="measure gains and store them in the runs first")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     options = parser.parse_args()
     opened = {name: open_run(name) for name in options.runs}
-    talk = held_out_talk(24.0, SEED, next(iter(opened.values())).config.fps)
+    talk = held_out_talk(24.0, options.talk_seed, next(iter(opened.values())).config.fps)
     speeches = Talk(talk.roles[: options.speeches], talk.fps).speeches
+    if options.emotion_gain is not None:
+        opened = {name: _with_gain(run, options.emotion_gain) for name, run in opened.items()}
     if options.store:
         opened = {name: _stored(name, run, speeches, options) for name, run in opened.items()}
     judge = None if options.judge is None else load_emotion_judge(options.judge, Corpus.open(options.judge_corpus))
@@ -84,7 +92,7 @@ def main() -> None:
         found["about"] = {
             "command": " ".join(["python -m experiments.controls", _named(name), *_given(options)]),
             "speeches": len(speeches),
-            "talk_seed": SEED,
+            "talk_seed": options.talk_seed,
             "seconds": SECONDS,
             "draws": options.draws,
             "seed": options.seed,
@@ -97,6 +105,12 @@ def main() -> None:
     (options.out / "controls.md").write_text(render(figures), encoding="utf-8")
     draw(figures, options.out / "controls.png")
     sys.stdout.write((options.out / "controls.md").read_text(encoding="utf-8"))
+
+
+def _with_gain(run: Run, gain: float) -> Run:
+    """The run with another gain of the control ``emotion``."""
+    others = [line for line in run.config.sampling_settings.control_gains if parse_gain(line)[0] != EMOTION]
+    return replace(run, config=run.config.with_sampling(control_gains=(*others, f"{EMOTION}={gain:g}")))
 
 
 def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Namespace) -> Run:
@@ -134,7 +148,7 @@ def _spread(run: Run, speeches: list[Speech]) -> Float[np.ndarray, " 5"]:
 
 def _has_emotion(run: Run) -> bool:
     controls = run.config.build().controls
-    return controls is not None and "emotion" in controls.categories
+    return controls is not None and EMOTION in controls.categories
 
 
 def _named(name: str) -> str:
