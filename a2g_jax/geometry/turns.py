@@ -53,6 +53,7 @@ def bridged(
     far: float,
     fps: float,
     fixed: Bool[np.ndarray, " T"] | None = None,
+    near: Bool[np.ndarray, " T"] | None = None,
 ) -> Float[np.ndarray, "T 3 3"]:
     """Rotations of one joint whose turns above ``fastest`` are replaced by a path between the frames around them.
 
@@ -64,9 +65,12 @@ def bridged(
         fastest: degrees/s.
         far: degrees from the mean pose: frames beyond it that adjoin a turn are replaced, too.
         fixed: frames that must stay; a turn at one of them does.
+        near: frames at which turns are replaced; all if None.
     """
     found = np.array(rotations, np.float64)
     fast = _steps(found) * fps > fastest
+    if near is not None:
+        fast &= near[1:]
     if not fast.any():
         return found
     middle = Rotation.from_matrix(mean)
