@@ -1,5 +1,6 @@
 """One recording as rows of a corpus: features and motion at the same frame times."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -19,6 +20,7 @@ from a2g_jax.geometry.retarget.calibration import calibration_frames
 from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.geometry.smooth import smooth
+from a2g_jax.geometry.turns import FASTEST, bridge_turns
 from a2g_jax.recording import PoseRecording, Recording
 
 #: Seconds of a calibration from which the lengths of motion and audio show whether the audio has it, too.
@@ -67,7 +69,8 @@ def prepare_recording(
 ) -> Prepared:
     """Features and motion of one recording, over the frames that both have.
 
-    A calibration pose at the start of a recorded motion is left out, with its audio; a note says so.
+    A calibration pose at the start of a recorded motion is left out, with its audio, and turns that are faster than any
+    limb's are bridged, since a network would repeat them; notes name both.
 
     Args:
         split: the recording's part of the official split, if any.
@@ -106,6 +109,9 @@ def prepare_recording(
         else:
             moved = on_skeleton(moved, skeleton, moved.fps, where, whole)
         motion = resample(moved, fps, frames)
+        if recording.sources:
+            motion, turned = bridge_turns(motion)
+            notes += flip_notes(recording.name, turned)
         root = np.asarray(motion.root, np.float32)
     pose, body = represent(motion, features.pose, where)
     waveform, gain = None, 1.0
@@ -123,9 +129,21 @@ def prepare_recording(
         emotion=recording.emotion,
         split=split,
         sources=recording.sources,
-        annotations={"words": [asdict(word) for word in recording.words], **recording.annotations},
+        annotations={
+            "words": [asdict(word) for word in recording.words],
+            **({"motion_fps": float(recording.motion.fps)} if recording.sources else {}),
+            **recording.annotations,
+        },
         notes=notes,
     )
+
+
+def flip_notes(name: str, turned: Mapping[str, int]) -> tuple[str, ...]:
+    """A note on joints whose turns were bridged, by joint with the number of frames; none without any."""
+    if not turned:
+        return ()
+    joints = ", ".join(f"{joint} ({count})" for joint, count in turned.items())
+    return (f"{name}: turns faster than {FASTEST:g} degrees a second are bridged; frames by joint: {joints}.",)
 
 
 def without_calibration(recording: Recording) -> tuple[Recording, tuple[str, ...]]:

@@ -31,6 +31,9 @@ SHARES = np.array([0.01, 0.03, 0.06, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9
 _MOST, _MOST_SLOW, _LEAST_SPEED = np.log(4.0), np.log(2.0), -np.log(10.0)
 #: Steps of the fit, and the share of what is missing that each adds: bands overlap, and each row moves others.
 _STEPS, _PACE = 3, 0.8
+#: Steps of the fit of jerk, the first of the bands that it changes, and what is added to jerk before its logarithm,
+#: m/s3.
+_JERK_STEPS, _FAST, _LEAST_JERK = 3, 3, 1.0
 #: Gains are half as strong, as logarithms, for so many seconds of recorded motion.
 _SECONDS = 2.0
 #: Least standard deviation of a value.
@@ -74,7 +77,9 @@ def _joints(space: PoseSpace, values: Values) -> Float[np.ndarray, "T J 3"]:
     return space.positions(np.asarray(filled, np.float32))[: len(values)]
 
 
-def fit_dynamics(drawn: Motions, recorded: Motions, moved: Moved, fps: float) -> Dynamics:
+def fit_dynamics(
+    drawn: Motions, recorded: Motions, moved: Moved, fps: float, recorded_fps: float | None = None
+) -> Dynamics:
     """Gains with which generated motion has the quantiles of the recorded motion's levels.
 
     Gains of a row follow the points that it moves, those of a hand the gains of shoulder and elbow: joints of
@@ -83,15 +88,19 @@ def fit_dynamics(drawn: Motions, recorded: Motions, moved: Moved, fps: float) ->
     Args:
         drawn: generated motions, 6D rotations or other values, of the speech of the recorded ones.
         recorded: motions of the person.
+        recorded_fps: rate of the recordings before they were brought to ``fps``; None if unknown. Motions are compared
+            at that rate, as what is interpolated between its frames is no motion of the person.
     """
+    step, known = recorded_step(fps, recorded_fps)
+    rate = fps / step
     mean, target = (np.concatenate(motions).mean(axis=0) for motions in (drawn, recorded))
     std = np.maximum(np.concatenate(recorded).std(axis=0), _STEADY)
     weight = std.mean(axis=-1) * moved.lever
     ours, theirs = ([(one - middle) / std for one in part] for part, middle in ((drawn, mean), (recorded, target)))
     slow = np.log(_spread(theirs, fps) / _spread(ours, fps))
     levels = _band_levels([np.mean(np.square(bands), axis=-1) for bands in _bands(ours, fps)], fps)
-    wanted = _point_levels(recorded, moved, fps)
-    wanted_speed = _quantiles([speed_level(one, weight, fps)[:, None] for one in theirs])[0]
+    wanted = _point_levels([one[::step] for one in recorded], moved, rate)
+    wanted_speed = _quantiles([speed_level(one[::step], weight, rate)[:, None] for one in theirs])[0]
     moving = np.any(moved.points != 0.0, axis=1, keepdims=True)
     found = Dynamics(
         mean=mean,
@@ -104,26 +113,68 @@ def fit_dynamics(drawn: Motions, recorded: Motions, moved: Moved, fps: float) ->
         speed_levels=wanted_speed,
         speed_gains=np.zeros(len(SHARES)),
     )
-    for step in range(_STEPS):
-        found = _with_speeds(found, ours, wanted_speed, fps, 2 if step == 0 else 1)
-        missing = wanted - _point_levels([with_dynamics(one, found, fps) for one in drawn], moved, fps)
+    for turn in range(_STEPS):
+        found = _with_speeds(found, ours, wanted_speed, fps, step, 2 if turn == 0 else 1)
+        missing = wanted - _point_levels([with_dynamics(one, found, fps)[::step] for one in drawn], moved, rate)
         gains = np.clip(found.gains + _PACE * np.where(moving, missing, 0.0), -_MOST, _MOST)
-        # Recordings at a lower rate hold interpolation in the highest band, which is no motion of the person.
-        gains[-1] = np.minimum(gains[-1], gains[-2])
+        if step > 1:
+            # The highest band is above what that rate can hold, and appears in the one below.
+            gains[-1] = gains[-2]
+        elif not known:
+            # Recordings at a lower rate hold interpolation in the highest band, which is no motion of the person.
+            gains[-1] = np.minimum(gains[-1], gains[-2])
         found = replace(found, gains=_monotone(levels, gains))
     seconds = sum(len(one) for one in recorded) / fps
     trust = seconds / (seconds + _SECONDS)
+    if known:
+        found = _with_jerk(found, drawn, recorded, moved, fps, step)
     found = replace(found, slow=trust * found.slow, gains=trust * found.gains, speed_gains=trust * found.speed_gains)
     found = replace(found, speed_levels=_speeds(found, ours, fps))
     return Dynamics.of(found.arrays())  # as precise as a stored run
 
 
-def _with_speeds(found: Dynamics, ours: Motions, wanted: np.ndarray, fps: float, steps: int) -> Dynamics:
+def _with_jerk(found: Dynamics, drawn: Motions, recorded: Motions, moved: Moved, fps: float, step: int) -> Dynamics:
+    """With gains of the fastest bands that also match the jerk of the points that each row moves.
+
+    Bands have the person's amplitudes before that, but within a band generated motion is faster. Interpolation between
+    recorded frames has a kink at each, so that this needs the rate of the recordings.
+    """
+    wanted = _jerk_levels([one[::step] for one in recorded], moved, fps / step)
+    moving = np.any(moved.points != 0.0, axis=1, keepdims=True)
+    for _ in range(_JERK_STEPS):
+        own = _jerk_levels([with_dynamics(one, found, fps)[::step] for one in drawn], moved, fps / step)
+        gains = found.gains.copy()
+        gains[_FAST:] += _PACE * np.where(moving, wanted - own, 0.0)
+        found = replace(found, gains=_monotone(found.levels, np.clip(gains, -_MOST, _MOST)))
+    return found
+
+
+def _jerk_levels(motions: Motions, moved: Moved, fps: float) -> Float[np.ndarray, "R shares"]:
+    """Quantiles of the logarithm of the jerk of the points that each row moves."""
+    powers = [
+        np.sum(np.square(np.diff(np.asarray(moved.positions(one)), n=3, axis=0) * fps**3), axis=-1) @ moved.points.T
+        for one in motions
+        if len(one) > 3
+    ]
+    return np.asarray(_quantiles([0.5 * np.log(power + _LEAST_JERK**2) for power in powers]))
+
+
+def recorded_step(fps: float, recorded_fps: float | None) -> tuple[int, bool]:
+    """Frames from one recorded frame to the next, and whether the rate of the recordings is known and fits: a multiple
+    of theirs, or below it."""
+    if recorded_fps is None:
+        return 1, False
+    step = max(1, round(fps / recorded_fps))
+    return (step, True) if recorded_fps >= fps or abs(fps / recorded_fps - step) < 0.01 else (1, False)
+
+
+def _with_speeds(found: Dynamics, ours: Motions, wanted: np.ndarray, fps: float, step: int, turns: int) -> Dynamics:
     """With gains of the speed that only slow."""
     found = replace(found, speed_levels=_speeds(found, ours, fps))
     banded = [one + band_change(one, found, fps) for one in ours]
-    for _ in range(steps):
-        after = [speed_level(one + speed_change(one, found, fps), found.weight, fps)[:, None] for one in banded]
+    for _ in range(turns):
+        slowed = [(one + speed_change(one, found, fps))[::step] for one in banded]
+        after = [speed_level(one, found.weight, fps / step)[:, None] for one in slowed]
         gains = found.speed_gains + _PACE * (wanted - _quantiles(after)[0])
         found = replace(found, speed_gains=_monotone(found.speed_levels, np.clip(gains, _LEAST_SPEED, 0.0)))
     return found

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Controls
-from a2g_jax.models.control_curves import Curve, check_ends, parse_curves
+from a2g_jax.models.control_curves import INCLUDED, Curve, check_ends, parse_curves
 from a2g_jax.training.run_config import Run
 
 Rows = Float[np.ndarray, "T K"]
@@ -50,7 +50,8 @@ def controls_of(run: Run) -> Controls:
     """
     controls = run.config.build().controls
     if controls is None:
-        raise InputError(f"the run of {run.config.model} has no controls; use 'demo' or 'demo-flow'.")
+        included = " or ".join(f"{name!r} ({', '.join(names)})" for name, names in INCLUDED.items())
+        raise InputError(f"the run of {run.config.model} has no controls; use {included}.")
     check_stored(run, controls)
     return controls
 

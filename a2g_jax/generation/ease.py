@@ -2,7 +2,9 @@
 
 Angles near a bound are compressed smoothly: those further than a few degrees inside it stay as they are, and none
 passes it. The correction is whole in the frames of a finding, fades to zero before and after them, and is zero from
-the border of a stretch on that has to stay. A motion without findings is not touched.
+the border of a stretch on that has to stay. Turns that are too fast are bridged by slower ones
+(:mod:`a2g_jax.geometry.turns`), and arms whose wrists are too fast are smoothed in time. A motion without findings is
+not touched.
 """
 
 from collections.abc import Iterable
@@ -10,10 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.turns import bridged
 from a2g_jax.metrics.body.bounds import BodyBounds
 from a2g_jax.metrics.body.check import BodyFinding, Stretch
 
@@ -24,13 +27,19 @@ _BEGIN, _END = 17.0, 2.0
 _WHOLE, _FADE = 0.25, 0.5
 #: Body joints that are eased; legs are not, since feet that stand would move.
 _ARM = ("Collar", "Shoulder", "Elbow", "Wrist")
+#: What is done about each figure, in the order of these names.
+_FIGURES = {"bend": "bend", "backwards": "bend", "range": "range", "turn": "turn"}
+_FIGURES |= dict.fromkeys(("wrist_speed", "wrist_jerk"), "wrist")
+#: Joints that are smoothed where a wrist is too fast, the standard deviations of the smoothing in seconds, of which the
+#: first that suffices is used, and the share of the bounds that suffices.
+_CHAIN, _SMOOTHING, _CALM = ("Collar", "Shoulder", "Elbow"), (0.03, 0.05, 0.08, 0.12, 0.2), 0.97
 _EASED = {"Spine1", "Spine2", "Spine3", "Neck", "Head", *(f"{side}_{part}" for side in "LR" for part in _ARM)}
 
 
 def ease(
     motion: Motion, findings: Iterable[BodyFinding], bounds: BodyBounds, stretches: Iterable[Stretch] = ()
 ) -> Motion:
-    """The motion with the joints of findings on ``bend``, ``backwards`` and ``range`` within their bounds.
+    """The motion with joints eased back for the findings on ``bend``, ``backwards``, ``range``, ``turn`` and wrists.
 
     Args:
         findings: on the motion. Those on legs and on other figures remain, since they need another motion; so do frames
@@ -46,11 +55,23 @@ def ease(
         fixed[max(stretch.first, 0) : max(stretch.stop, 0)] = True
     found: dict[tuple[str, str], Bool[np.ndarray, " T"]] = {}
     for one in findings:
-        role, figure = roles.get(one.joint), "range" if one.figure == "range" else "bend"
-        if role in _EASED and one.figure in ("bend", "backwards", "range"):
+        role, figure = roles.get(one.joint), _FIGURES.get(one.figure)
+        if role in _EASED and figure is not None:
             found.setdefault((figure, role), np.zeros(motion.frames, bool))[one.first : one.stop] = True
+            if figure == "range":
+                # Joints that are turned too far may be eased back to either side, with a jump between the two.
+                found.setdefault(("turn", role), np.zeros(motion.frames, bool))[one.first : one.stop] = True
     rotations = np.asarray(motion.rotations, np.float64).copy()
     for (figure, role), outside in sorted(found.items(), key=lambda item: item[0]):
+        if figure == "wrist":
+            rotations = _calmer(replace(motion, rotations=rotations), role, bounds, outside & ~fixed, fixed)
+            continue
+        if figure == "turn":
+            joint = reference.joints[role]
+            limits = bounds.high["turn"][joint], bounds.high["range"][joint]
+            near = _weight(outside, np.zeros_like(fixed), motion.fps) > 0.0
+            rotations[:, joint] = bridged(rotations[:, joint], reference.pose[joint], *limits, motion.fps, fixed, near)
+            continue
         weight = _weight(outside & ~fixed, fixed, motion.fps)
         rows = weight > 0.0
         joint = reference.joints[role]
@@ -76,6 +97,34 @@ def within_bounds(rotations: Float[np.ndarray, "T J 3 3"], bounds: BodyBounds) -
             eased[:, joint] = _within_flexion(eased, role, bounds, whole)
         eased[:, joint] = _within_range(eased[:, joint], role, bounds, whole)
     return eased
+
+
+def _calmer(
+    motion: Motion, role: str, bounds: BodyBounds, outside: Bool[np.ndarray, " T"], fixed: Bool[np.ndarray, " T"]
+) -> Float[np.ndarray, "T J 3 3"]:
+    """Rotations with the arm of a wrist smoothed in time, no more than needed for its speed and jerk."""
+    reference, found = bounds.reference, np.asarray(motion.rotations)
+    weight = _weight(outside, fixed, motion.fps)
+    rows = np.flatnonzero(weight)
+    if not len(rows):
+        return found
+    column = reference.wrists.index(role)
+    joints = [reference.joints[name] for part in _CHAIN if (name := f"{role[:2]}{part}") in reference.joints]
+    around = slice(max(int(rows[0]) - 3, 0), int(rows[-1]) + 4)
+    for seconds in _SMOOTHING:
+        found = np.array(motion.rotations)
+        for joint in joints:
+            own = Rotation.from_matrix(found[:, joint])
+            values = own.as_quat()
+            values[1:] *= np.cumprod(np.where(np.sum(values[1:] * values[:-1], axis=1) < 0.0, -1.0, 1.0))[:, None]
+            calm = Rotation.from_quat(gaussian_filter1d(values, seconds * motion.fps, axis=0, mode="nearest"))
+            change = Rotation.from_rotvec(weight[:, None] * (own.inv() * calm).as_rotvec())
+            found[rows, joint] = (own * change).as_matrix()[rows]
+        figures = reference.figures(replace(motion.clip(around.start, around.stop), rotations=found[around]))
+        shares = [figures[name][:, column].max() / bounds.high[name][column] for name in ("wrist_speed", "wrist_jerk")]
+        if max(shares) <= _CALM:
+            break
+    return found
 
 
 def _weight(outside: Bool[np.ndarray, " T"], fixed: Bool[np.ndarray, " T"], fps: float) -> Float[np.ndarray, " T"]:

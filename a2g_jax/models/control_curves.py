@@ -13,6 +13,12 @@ from a2g_jax.errors import InputError
 
 #: Quantile of a control that is not requested, in models that always have one: the median of the training clips.
 DEFAULT = 0.5
+#: Included runs by the names of their controls, for messages.
+INCLUDED = {
+    "demo": ("energy", "height", "radius", "rate", "handedness", "emotion"),
+    "demo-flow": ("energy", "height", "radius"),
+    "demo-emotion": ("emotion",),
+}
 #: Names of controls that runs store among their settings, by the names that requests have.
 _ALIASES = {"speed": "energy"}
 
@@ -92,7 +98,7 @@ def parse_curves(
     for text in texts:
         line = parse_line(text)
         if line.name not in known:
-            raise _refused(text, f"the run's controls are: {', '.join(known) or 'none'}")
+            raise _refused(text, f"the run's controls are: {', '.join(known) or 'none'}{_elsewhere(line.name)}")
         if line.name in curves:
             raise _refused(text, f"{line.name} is requested twice; give its changes as VALUE@SECOND,VALUE@SECOND")
         words = (categories or {}).get(line.name)
@@ -140,6 +146,12 @@ def from_percentiles(text: str) -> str:
     if not equals or not all(_is_number(value) for value, _, _ in parts):
         return text
     return f"{name}={' '.join(f'{float(value) / 100:g}{at}{second}' for value, at, second in parts)}"
+
+
+def _elsewhere(name: str) -> str:
+    """The included runs that have a control, for a message; nothing if none has."""
+    runs = [repr(run) for run, names in INCLUDED.items() if name in names]
+    return f"; {' and '.join(runs)} {'has' if len(runs) == 1 else 'have'} {name}" if runs else ""
 
 
 def _quantile(value: str, line: str) -> float:

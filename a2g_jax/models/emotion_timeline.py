@@ -6,7 +6,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -89,12 +89,23 @@ def emotion_rows(
         raise _refused(
             text, f"second {points[-1].second:g} is past the end of the speech, which lasts {frames / fps:.2f} s"
         )
-    seconds = np.arange(frames) / fps
-    rows = np.tile(_weights(points[0], emotions), (frames, 1))
-    for point in points[1:]:
-        arrived = np.clip((seconds - point.second) / FADE, 0.0, 1.0)[:, None]
-        rows = (1.0 - arrived) * rows + arrived * _weights(point, emotions)[None]
-    return rows.astype(np.float32)
+    begins = np.array([point.second for point in points])
+    index = np.searchsorted(begins, np.arange(frames) / fps, side="right") - 1
+    rows = np.array([_weights(point, emotions) for point in points])[np.maximum(index, 0)]
+    return np.asarray(faded(rows, fps), np.float32)
+
+
+def faded(rows: Any, fps: float) -> Any:
+    """Rows whose changes from frame to frame take half a second, linearly: the mean of the frames before each.
+
+    Before the first row is as that. Works on arrays of NumPy and JAX.
+
+    Args:
+        rows: (T, ...), a row a frame.
+    """
+    span, frames = FADE * fps, np.arange(len(rows))
+    parts = [min(1.0, span - back) * rows[np.maximum(frames - back - 1, 0)] for back in range(math.ceil(span))]
+    return sum(parts[1:], parts[0]) / span
 
 
 def _weights(point: Point, emotions: Sequence[str]) -> Float[np.ndarray, " E"]:

@@ -11,8 +11,8 @@ from a2g_jax.training.run_config import RunConfig
 def corpus_extremes(corpus: Corpus, config: RunConfig) -> dict[str, Float[np.ndarray, " _"]] | None:
     """Extremes of the training split (:func:`~a2g_jax.metrics.body.bounds.extremes`), relative to the run's mean pose.
 
-    Of a long corpus every n-th stretch counts. Less than a minute has too few gestures to tell what its people do not
-    do: it raises the extremes that the run has already, which are those of the run that it started from.
+    Of a long corpus every n-th stretch counts. A run that started from another one moves like both: its corpus raises
+    the extremes of that run. Less than a minute has too few gestures to tell what its people do not do.
 
     Args:
         corpus: with the whole training split, also what is held out of it for validation.
@@ -25,7 +25,7 @@ def corpus_extremes(corpus: Corpus, config: RunConfig) -> dict[str, Float[np.nda
         return None
     segments = corpus.segments("train")
     frames = sum(segment.stop - segment.start for segment in segments)
-    earlier = None if frames >= LEAST_SECONDS * corpus.fps else config.body_extremes
+    earlier = config.body_extremes
     if earlier is None and frames < LEAST_SECONDS * corpus.fps:
         return None
     chosen = segments[:: -(-frames // MOST_FRAMES)]

@@ -1,5 +1,6 @@
 """The dynamics of a fine-tuned run: gains from its motion for the speech of the recordings, and from these."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.splits import Segment
 from a2g_jax.features.dynamics import Dynamics, Values, values_of
 from a2g_jax.features.dynamics_fit import fit_dynamics, moved_by
 from a2g_jax.models.base import Condition, Model, Params, Summary
@@ -46,7 +48,14 @@ def corpus_dynamics(
         recorded.append(values_of(space, np.asarray(pose, np.float32)))
         keys = jax.random.split(jax.random.fold_in(jax.random.key(2), number), _SAMPLES)
         drawn += [draw(params, summary, key, np.asarray(audio, np.float32)) for key in keys]
-    return fit_dynamics(drawn, recorded, moved_by(space), config.fps)
+    return fit_dynamics(drawn, recorded, moved_by(space), config.fps, recorded_fps(corpus, segments))
+
+
+def recorded_fps(corpus: Corpus, segments: Sequence[Segment]) -> float | None:
+    """Lowest frame rate of the recordings of segments before they were prepared; None where a corpus of an earlier
+    version does not have one of them."""
+    rates = [corpus.annotations(number).get("motion_fps") for number in {one.recording for one in segments}]
+    return None if None in rates else float(min(rates))
 
 
 def _drawing(model: Model, config: RunConfig) -> Any:

@@ -28,9 +28,11 @@ from jaxtyping import Float
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge
 from a2g_jax.features.hand_properties import PROPERTIES
+from a2g_jax.generation.controls import controls_of
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.io.files import read_json, write_json
 from a2g_jax.io.sealed import read_sealed, write_sealed
+from a2g_jax.models.control_curves import parse_gain
 from a2g_jax.progress import progress_bar
 from a2g_jax.training.run import Run, open_run
 from a2g_jax.training.run_file import RUN_FILE, run_folder
@@ -41,6 +43,8 @@ from experiments.controls.subject import SECONDS, Ruler, Subject, column
 from experiments.controls.table import render
 from experiments.motion.speeches import SEED, Speech, Talk, held_out_talk
 
+#: The control with a gain that is chosen on other speeches, with ``--talk-seed`` and ``--emotion-gain``.
+EMOTION = "emotion"
 #: Largest gain: beyond it, all requests but those near the median would be for the extreme clips.
 MOST = 2.5
 
@@ -54,12 +58,19 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the motions (default: %(default)s)")
     parser.add_argument("--judge", help="a run of emotion_classifier; without it, emotions are not measured")
     parser.add_argument("--judge-corpus", type=Path, help="the corpus of the judge (needed with --judge)")
+    parser.add_argument("--talk-seed", type=int, default=SEED, help="of the speeches (default: %(default)s)")
+    parser.add_argument(
+        "--emotion-gain", type=float, metavar="G", help="another gain of the control emotion; give --out"
+    )
+    parser.add_argument("--only-emotions", action="store_true", help="keep the other figures that are there")
     parser.add_argument("--store", action="store_true", help="measure gains and store them in the runs first")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     options = parser.parse_args()
     opened = {name: open_run(name) for name in options.runs}
-    talk = held_out_talk(24.0, SEED, next(iter(opened.values())).config.fps)
+    talk = held_out_talk(24.0, options.talk_seed, next(iter(opened.values())).config.fps)
     speeches = Talk(talk.roles[: options.speeches], talk.fps).speeches
+    if options.emotion_gain is not None:
+        opened = {name: _with_gain(run, options.emotion_gain) for name, run in opened.items()}
     if options.store:
         opened = {name: _stored(name, run, speeches, options) for name, run in opened.items()}
     judge = None if options.judge is None else load_emotion_judge(options.judge, Corpus.open(options.judge_corpus))
@@ -72,20 +83,21 @@ def main() -> None:
         emotions = run.config.data().emotions if judge is not None and _has_emotion(run) else ()
         if judge is not None and emotions:
             figures |= {"emotions": list(emotions), "true_emotions": true_confusion(judge, emotions)}
-        total = 1 + len(subject.names) * (len(QUANTILES) + 1) + len(emotions)
+        before = figures["runs"].get(_named(name)) if options.only_emotions else None
+        total = len(emotions) + (1 + len(subject.names) * (len(QUANTILES) + 1) if before is None else 0)
         with progress_bar(total, f"measuring {_named(name)}", "request") as bar:
-            found = responses(subject, _spread(run, speeches), lambda: bar.update(1))
+            found = before or responses(subject, _spread(run, speeches), lambda: bar.update(1))
             if judge is not None and emotions:
                 found["emotions"] = confusion(subject, judge, emotions, lambda: bar.update(1))
         found["about"] = {
             "command": " ".join(["python -m experiments.controls", _named(name), *_given(options)]),
             "speeches": len(speeches),
-            "talk_seed": SEED,
+            "talk_seed": options.talk_seed,
             "seconds": SECONDS,
             "draws": options.draws,
             "seed": options.seed,
             "intervals": "Student's t",
-            "gains": list(run.config.sampling_settings.control_gains),
+            "gains": list(getattr(run.config.sampling_settings, "control_gains", ())),
             "judge": judge.fingerprint if judge is not None and emotions else None,
         }
         figures["runs"][_named(name)] = found
@@ -93,6 +105,12 @@ def main() -> None:
     (options.out / "controls.md").write_text(render(figures), encoding="utf-8")
     draw(figures, options.out / "controls.png")
     sys.stdout.write((options.out / "controls.md").read_text(encoding="utf-8"))
+
+
+def _with_gain(run: Run, gain: float) -> Run:
+    """The run with another gain of the control ``emotion``."""
+    others = [line for line in run.config.sampling_settings.control_gains if parse_gain(line)[0] != EMOTION]
+    return replace(run, config=run.config.with_sampling(control_gains=(*others, f"{EMOTION}={gain:g}")))
 
 
 def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Namespace) -> Run:
@@ -109,6 +127,8 @@ def _stored(name: str, run: Run, speeches: list[Speech], options: argparse.Names
         print(f"{name}: {control} responds by {slope:.2f}; gain {gain:.2f}")
         if gain > 1.0:
             lines.append(f"{control}={gain:.2f}")
+    categories = controls_of(run).categories
+    lines += [line for line in run.config.sampling_settings.control_gains if parse_gain(line)[0] in categories]
     about = run_folder(name) / RUN_FILE
     values = read_sealed(about)
     values["sampling"] |= {"control_gains": lines}
@@ -128,7 +148,7 @@ def _spread(run: Run, speeches: list[Speech]) -> Float[np.ndarray, " 5"]:
 
 def _has_emotion(run: Run) -> bool:
     controls = run.config.build().controls
-    return controls is not None and "emotion" in controls.categories
+    return controls is not None and EMOTION in controls.categories
 
 
 def _named(name: str) -> str:

@@ -19,14 +19,16 @@ SEED = 78
 def confusion(
     subject: Subject, judge: EmotionJudge, emotions: Sequence[str], report: Callable[[], None] = lambda: None
 ) -> dict[str, Any]:
-    """Shares of clips of each requested emotion that are classified as each."""
-    table, correct = [], []
+    """Shares of clips of each requested emotion that are classified as each, and agreement with the speech."""
+    table, correct, agreement = [], [], []
     for emotion in emotions:
-        shares = np.array([judge.shares(rows, emotions) for _, rows in subject.rows([f"emotion={emotion}"])])
+        made = list(subject.rows([f"emotion={emotion}"]))
+        shares = np.array([judge.shares(rows, emotions) for _, rows in made])
+        agreement.append(float(np.mean([subject.figures(speech, rows).agreement for speech, rows in made])))
         table.append(shares.mean(axis=0))
         correct.append(shares[:, emotions.index(emotion)].reshape(len(subject.speeches), -1).mean(axis=1))
         report()
-    return _summary(np.array(table), np.array(correct))
+    return _summary(np.array(table), np.array(correct)) | {"agreement": agreement}
 
 
 def true_confusion(judge: EmotionJudge, emotions: Sequence[str]) -> dict[str, Any]:

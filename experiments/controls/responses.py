@@ -13,7 +13,7 @@ from experiments.controls.subject import SECONDS, Figures, Subject, by_speech, c
 #: Requested quantiles; slopes are between the first and the last, at the 10th and the 90th percentile of people.
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 #: Seconds and quantiles of the curve that rises and falls.
-CURVE = ((0.0, 0.1), (7.5, 0.9), (15.0, 0.1), (22.5, 0.9), (30.0, 0.1))
+CURVE = ((0.0, 0.1), (7.5, 0.9), (15.0, 0.1), (22.5, 0.9), (29.9, 0.1))
 #: Seconds around a peak or valley of the curve in which the response to it is measured.
 AROUND = 4.0
 
@@ -71,7 +71,7 @@ def _curve(
     jerks, high, low = [], [], []
     for _, rows in subject.rows([line]):
         jerks.append(subject.ruler.jerk(rows))
-        inside = [(round(second * fps) - reach, value) for second, value in CURVE if 0 < second < SECONDS]
+        inside = [(round(at * fps) - reach, value) for at, value in CURVE if AROUND < at < SECONDS - AROUND]
         local = [(subject.ruler.properties(rows[at : at + 2 * reach])[index], value) for at, value in inside]
         high.append(np.mean([found for found, value in local if value > 0.5]))
         low.append(np.mean([found for found, value in local if value < 0.5]))

@@ -122,9 +122,10 @@ class Subject:
 
     def measure(self, lines: Sequence[str]) -> list[Figures]:
         """Figures of every motion; :attr:`draws` of one speech follow one another."""
-        return [self._figures(speech, rows) for speech, rows in self.rows(lines)]
+        return [self.figures(speech, rows) for speech, rows in self.rows(lines)]
 
-    def _figures(self, speech: Speech, rows: Rows) -> Figures:
+    def figures(self, speech: Speech, rows: Rows) -> Figures:
+        """Figures of one motion."""
         space, fps = self.run.config.space, self.run.config.fps
         rotations = np.asarray(space.rotations(jnp.asarray(rows)))
         motion = Motion(rotations, np.zeros((len(rows), 3), np.float32), space.skeleton, fps)

@@ -24,10 +24,7 @@ def render(figures: dict[str, Any]) -> str:
             f" {about.get('intervals', 'the percentile bootstrap')}; gains"
             f" {', '.join(about['gains']) or 'none'}.",
             "",
-            *_slopes(run),
-            "",
-            *_side_effects(run),
-            "",
+            *([*_slopes(run), "", *_side_effects(run), ""] if run["controls"] else []),
         ]
     if "true_emotions" in figures:
         lines += ["## Emotions", "", *_emotions(figures)]
@@ -93,7 +90,8 @@ def _emotions(figures: dict[str, Any]) -> list[str]:
     for run, found in figures["runs"].items():
         if "emotions" in found:
             lines += [
-                f"{run}: {_with_interval(found['emotions']['accuracy'])}. Rows are requested, columns classified:",
+                f"{run}: {_with_interval(found['emotions']['accuracy'])}.{_kept(found)} Rows are requested, columns"
+                " classified:",
                 "",
             ]
             rows = [
@@ -102,6 +100,15 @@ def _emotions(figures: dict[str, Any]) -> list[str]:
             ]
             lines += [*_table(["", *names, "true motion, right"], rows), ""]
     return lines
+
+
+def _kept(run: dict[str, Any]) -> str:
+    """Agreement with the speech with each emotion, in per cent of that of motion without controls."""
+    free, found = run["free"]["agreement"]["mean"], run["emotions"].get("agreement")
+    if not found:
+        return ""
+    changes = [100.0 * (one / free - 1.0) for one in found]
+    return f" Agreement with the speech changes by {min(changes):+.0f} to {max(changes):+.0f} %."
 
 
 def _with_interval(found: dict[str, Any], digits: int = 2) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from a2g_jax.errors import InputError
 from a2g_jax.evaluation.emotion_judge import EmotionJudge
+from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.generator import Generator
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.metrics.labels import confusion
@@ -31,30 +32,41 @@ def takes_requests(run: Run) -> bool:
     )
 
 
-def requested(run: Run, bench: Bench, seed: int) -> dict[str, Any]:
-    """Scores and counts of test speeches in every emotion that the run and the judge have; no seed clip is given."""
+def requested(run: Run, bench: Bench, seed: int, control: bool = False) -> dict[str, Any]:
+    """Scores and counts of test speeches in every emotion that the run and the judge have; no seed clip is given.
+
+    Args:
+        control: whether emotions are requested by ``--control emotion=X`` in place of weights of the emotions.
+    """
     judge, corpus = bench.ruler.judge, bench.corpus
     assert judge is not None
-    generator = Generator(replace(run, config=run.config.with_sampling(emotion="label")), _WINDOW)
+    plain = run if control else replace(run, config=run.config.with_sampling(emotion="label"))
+    generator = Generator(plain, _WINDOW)
     names = list(run.config.corpus["emotions"])
     segments = corpus.segments("test")
     chosen = segments[:: max(1, len(segments) // SPEECHES)][:SPEECHES]
-    tally, others = _Tally(judge), _Tally(judge)
+    tally, others, each = _Tally(judge), _Tally(judge), []
     for number, segment in enumerate(chosen):
+        alone = _Tally(judge)
         stop = min(segment.stop, segment.start + round(SECONDS * corpus.fps))
         audio = np.asarray(corpus.audio[segment.start : stop])
         for emotion in judge.emotions:
             if emotion not in names:
                 continue
             weights = np.tile(np.eye(len(names), dtype=np.float32)[names.index(emotion)], (len(audio), 1))
-            for rows in generator.rows(audio, SAMPLES, (seed + 7919 * (number + 1)) % 2**31, emotion=weights):
+            given: dict[str, Any] = {"emotion": weights}
+            if control:
+                given = {"controls": control_rows(run, [f"emotion={emotion}"], len(audio))}
+            for rows in generator.rows(audio, SAMPLES, (seed + 7919 * (number + 1)) % 2**31, **given):
                 tally.add(rows, emotion)
+                alone.add(rows, emotion)
                 if emotion != corpus.recordings[segment.recording].emotion:
                     others.add(rows, emotion)
+        each.append(alone.accuracy)
     if not tally.counts.any():
         raise InputError("--judge: has none of the emotions of the run.")
     scores = {"requested_accuracy": cell(tally.accuracy), "requested_other_accuracy": cell(others.accuracy)}
-    return {"scores": scores | tally.above(), "requests": tally.counts.tolist()}
+    return {"scores": scores | tally.above(), "requests": tally.counts.tolist(), "by_speech": each}
 
 
 def true_emotions(bench: Bench) -> dict[str, Any]:

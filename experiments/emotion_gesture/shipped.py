@@ -2,18 +2,22 @@
 
     python -m experiments.emotion_gesture.shipped demo-emotion --corpus CORPUS --judge JUDGE
 
-Six test speeches of the corpus in every emotion, two samples each, 30 s, without a seed clip. The judge is a run of
+Six test speeches of the corpus in every emotion by ``--control emotion=X``, two samples each for every seed, 30 s,
+without a seed clip; intervals are over speeches. The judge is a run of
 ``emotion_classifier --input motion --clip-frames 50``, trained on recordings that the corpus does not have. Writes
-``results/shipped.md`` and ``results/shipped.json``: about a minute of one core.
+``results/shipped.md`` and ``results/shipped.json``: about a minute of one core for each seed.
 """
 
 import argparse
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from a2g_jax.data.corpus import Corpus
 from a2g_jax.evaluation.emotion_judge import load_emotion_judge
 from a2g_jax.io.files import atomic_path, write_json
+from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.training.run import open_run
 from experiments.emotion_gesture.bench import Bench
 from experiments.emotion_gesture.requests import requested, true_emotions
@@ -28,16 +32,17 @@ def main() -> None:
     parser.add_argument("run", help="a run folder, or 'demo-emotion'")
     parser.add_argument("--corpus", type=Path, required=True)
     parser.add_argument("--judge", type=Path, required=True, help="a run of emotion_classifier")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", default="0,1,2", help="comma-separated (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args()
     corpus = Corpus.open(options.corpus)
     bench = Bench(Ruler(corpus, None, 2, judge=load_emotion_judge(options.judge, corpus)))
+    seeds, run = list(map(int, options.seeds.split(","))), open_run(options.run)
     found = {
         "emotions": list(bench.ruler.judge.emotions) if bench.ruler.judge else [],
-        "seed": options.seed,
-        options.run: requested(open_run(options.run), bench, options.seed),
-        "true motion": true_emotions(bench),
+        "seeds": seeds,
+        options.run: together([requested(run, bench, seed, control=True) for seed in seeds]),
+        "true motion": together([true_emotions(bench)]),
     }
     options.out.mkdir(parents=True, exist_ok=True)
     write_json(options.out / "shipped.json", found)
@@ -46,16 +51,35 @@ def main() -> None:
     print(page(found, options.run))
 
 
+def together(each: list[dict[str, Any]]) -> dict[str, Any]:
+    """Requests of several seeds: scores on average, counts in all, and the interval of the accuracy over speeches."""
+    names = each[0]["scores"]
+    scores = {name: {"mean": float(np.mean([one["scores"][name]["mean"] for one in each]))} for name in names}
+    found = {
+        "scores": scores,
+        "by_seed": [one["scores"]["requested_accuracy"]["mean"] for one in each],
+        "requests": np.sum([one["requests"] for one in each], axis=0).tolist(),
+    }
+    if "by_speech" in each[0]:
+        found["interval"] = mean_interval(np.mean([one["by_speech"] for one in each], axis=0)).to_json()
+    return found
+
+
 def page(found: dict[str, Any], run: str) -> str:
     """The tables as Markdown."""
     names = found["emotions"]
     lines = ["# Requested emotions", "", f"Made by `python -m experiments.emotion_gesture.shipped {run}`.", ""]
     for label in (run, "true motion"):
         scores, counts = found[label]["scores"], found[label]["requests"]
+        between = found[label].get("interval")
+        ends = f" [{between['low']:.2f}, {between['high']:.2f}] over speeches" if between else ""
+        if len(found[label]["by_seed"]) > 1:
+            ends += f"; by seed {', '.join(format(one, '.2f') for one in found[label]['by_seed'])}"
         lines += [
             f"## {label}",
             "",
-            f"Classified as requested: **{scores['requested_accuracy']['mean']:.2f}** (chance {1 / len(names):.3f});"
+            f"Classified as requested: **{scores['requested_accuracy']['mean']:.2f}**{ends}"
+            f" (chance {1 / len(names):.3f});"
             f" where the speech has another emotion: {scores['requested_other_accuracy']['mean']:.2f}.",
             "",
             f"| requested | {' | '.join(names)} | above neutral |",

@@ -11,7 +11,7 @@ from a2g_jax.models.base import Model
 from a2g_jax.models.fine_tuning import FineTuning
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.dynamics import corpus_dynamics
-from a2g_jax.training.fine_tuning import start_from, tuned_config, tuned_model, with_validation
+from a2g_jax.training.fine_tuning import start_from, tuned_config, tuned_model, with_validation, without_measured
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import Run, RunConfig, open_run
 from a2g_jax.training.validation import collect_summary
@@ -50,6 +50,16 @@ def moved(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     return Made(replace(run, dynamics=dynamics), (time.process_time() - begun) / 60.0)
 
 
+def scratch_moved(name: str, fold: Fold, seed: int, folder: Path) -> Made:
+    """The run from scratch with the dynamics of the person, as fine-tuning measures them."""
+    begun = time.process_time()
+    made = from_scratch(name, fold, seed, folder.with_name(folder.name.replace("-with-dynamics", "")))
+    run, start = made.run, start_from(name, open_run(name))
+    config = replace(run.config, source=start.source)
+    dynamics = corpus_dynamics(config.build(), config, run.params, run.summary, fold.corpus)
+    return Made(replace(run, dynamics=dynamics), made.cpu_minutes + (time.process_time() - begun) / 60.0)
+
+
 def _untrained(name: str, fold: Fold, seed: int) -> tuple[Run, Model]:
     start = start_from(name, open_run(name))
     config = tuned_config(start, *_tuned_settings(start.run, seed), fold.corpus)
@@ -78,7 +88,7 @@ def from_scratch(name: str, fold: Fold, seed: int, folder: Path) -> Made:
     first = steps - later
     training = replace(training, steps=first, seed=seed, warmup_steps=first // 10, validate_every=10**6)
     config = RunConfig.of(run.config.model, run.config.preset, settings, training, fold.corpus)
-    return _timed(replace(config, sampling=run.config.sampling), fold, folder, None)
+    return _timed(replace(config, sampling=without_measured(run.config.sampling)), fold, folder, None)
 
 
 METHODS: dict[str, Method] = {
@@ -86,6 +96,7 @@ METHODS: dict[str, Method] = {
     "z-scores adapted alone": adapted,
     "z-scores and dynamics alone": moved,
     "from scratch": from_scratch,
+    "from scratch with dynamics": scratch_moved,
     "fine-tuned": fine_tuned,
 }
 #: What of the settings of fine-tuning a method depends on; it is measured again when they change.
@@ -94,6 +105,7 @@ SETTINGS: dict[str, Callable[[FineTuning], str]] = {
     "z-scores adapted alone": lambda tuning: repr(replace(tuning, training=TrainConfig())),
     "z-scores and dynamics alone": lambda tuning: repr(replace(tuning, training=TrainConfig())),
     "from scratch": lambda tuning: str(tuning.training.steps),
+    "from scratch with dynamics": lambda tuning: str(tuning.training.steps),
     "fine-tuned": repr,
 }
 

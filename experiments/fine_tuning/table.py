@@ -18,7 +18,7 @@ GROUPS = {
     "jerk": ("jerk_p50", "jerk_p90"),
     "posture": ("posture",),
 }
-_TUNED, _RIVALS = "fine-tuned", ("shipped", "from scratch")
+_TUNED, _RIVALS = "fine-tuned", ("shipped", "from scratch", "from scratch with dynamics")
 #: Distances of a record by group, and ``all``.
 Distances = dict[str, float]
 
@@ -84,7 +84,17 @@ def _take(records: list[Record]) -> list[str]:
         cells.append("" if not steps else str(steps[0]) if len(set(steps)) == 1 else f"{min(steps)} to {max(steps)}")
         cells.append(_mean([fold["cpu_minutes"] for fold in trained], 1))
         lines.append(f"| {method} | " + " | ".join(cells) + " |")
-    return [*lines, "", *_differences(records, person), ""]
+    return [*lines, "", *_single_parts(records, person, methods), "", *_differences(records, person), ""]
+
+
+def _single_parts(records: list[Record], person: Record, methods: Sequence[str]) -> list[str]:
+    """Distances in single parts by group: those of the person's other 80 % are the floor of what can be expected."""
+    lines = [f"| distance in single parts | all | {' | '.join(GROUPS)} |", "|---|---|" + "---|" * len(GROUPS)]
+    for method in (OTHERS, *methods):
+        each = [_single(record, person) for record in records if record["method"] == method]
+        cells = [_mean([one[name] for one in each], 2) for name in ("all", *GROUPS)]
+        lines.append(f"| {method} | " + " | ".join(cells) + " |")
+    return lines
 
 
 def _differences(records: list[Record], person: Record) -> list[str]:

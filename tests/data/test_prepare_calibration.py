@@ -1,4 +1,4 @@
-"""``a2g prepare`` leaves calibration poses out, says so, and smooths motion where that is requested."""
+"""``a2g prepare`` leaves calibration poses out, bridges flips, says so, and smooths motion where that is requested."""
 
 from dataclasses import replace
 
@@ -68,3 +68,24 @@ def test_the_command_says_so_and_smooths(recording, tmp_path, capsys):
     assert one.shape == two.shape
     assert 1e-4 < np.abs(one - two).max() < 0.2
     np.testing.assert_array_equal(one, three)
+
+
+def test_flips_are_bridged_and_named(recording):
+    """A corpus with them has networks that flip hands, too."""
+    wrist = recording.motion.skeleton.names.index("L_Wrist")
+    rotations = np.array(recording.motion.rotations)
+    rotations[60:64, wrist] = rotations[60:64, wrist] @ np.diag([1.0, -1.0, -1.0]).astype(np.float32)
+    taken = replace(recording, sources=("a.wav", "a.bvh"))
+    flipped = replace(taken, motion=replace(taken.motion, rotations=rotations))
+    prepared, plain = prepare_recording(flipped, FEATURES), prepare_recording(taken, FEATURES)
+    (note,) = prepared.notes
+    assert note.startswith("take: turns faster than 1800 degrees a second are bridged; frames by joint: L_Wrist (")
+    assert prepared.annotations["motion_fps"] == recording.motion.fps
+    assert plain.notes == ()
+    changed = np.any(prepared.pose != plain.pose, axis=(1, 2))
+    assert 4 <= changed.sum() < 20
+    assert np.abs(np.diff(prepared.pose, axis=0)).max() < 1.0 < np.abs(np.diff(represented(flipped), axis=0)).max()
+
+
+def represented(recording):
+    return prepare_recording(replace(recording, sources=()), FEATURES).pose

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from a2g_jax.features.dynamics import EDGES, Dynamics, rows_with_dynamics, split, with_dynamics
-from a2g_jax.features.dynamics_fit import SHARES, Moved, fit_dynamics, moved_by
+from a2g_jax.features.dynamics_fit import SHARES, Moved, fit_dynamics, moved_by, recorded_step
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.talker.recordings import talk
 
@@ -134,3 +134,33 @@ def test_arrays_of_other_shapes_are_refused():
         Dynamics.of({**arrays, "gains": arrays["gains"][:, :2]})
     with pytest.raises(ValueError, match="NaN"):
         Dynamics.of({**arrays, "slow": np.full(ROWS, np.nan, np.float32)})
+
+
+def test_jerk_is_the_recorded_one_where_its_rate_is_known():
+    """Bands alone leave it too high where the recorded motion is at the lower end of its bands."""
+    jerk = lambda one, step: np.median(np.abs(np.diff(one[::step], n=3, axis=0)))  # noqa: E731
+    drawn, recorded = [noise(1, smooth=1.6)], [noise(2, smooth=2.4)]
+    found = fit_dynamics(drawn, recorded, ALONE, FPS, FPS)
+    ours, theirs = jerk(with_dynamics(drawn[0], found, FPS), 1), jerk(recorded[0], 1)
+    assert abs(np.log2(ours / theirs)) < 0.25 < abs(np.log2(jerk(drawn[0], 1) / theirs))
+    # A recording at half the rate has kinks between its frames, which count as no jerk.
+    slow = recorded[0].copy()
+    slow[1:-1:2] = (slow[:-2:2] + slow[2::2]) / 2.0
+    found = fit_dynamics(drawn, [slow], ALONE, FPS, FPS / 2)
+    ours, theirs = jerk(with_dynamics(drawn[0], found, FPS), 2), jerk(slow, 2)
+    assert abs(np.log2(ours / theirs)) < 0.25
+
+
+@pytest.mark.parametrize(
+    ("recorded", "expected"),
+    [
+        (None, (1, False)),
+        (15.0, (2, True)),
+        (30.0, (1, True)),
+        (120.0, (1, True)),
+        (25.0, (1, False)),
+        (10.0, (3, True)),
+    ],
+)
+def test_the_step_from_one_recorded_frame_to_the_next(recorded, expected):
+    assert recorded_step(30.0, recorded) == expected

@@ -57,6 +57,41 @@ def test_within_the_bounds(joint, axis, degrees, figure):
     assert jerk < 1.5 * REFERENCE.figures(bad)["wrist_jerk"].max()
 
 
+def test_flips_become_turns():
+    """Of a hand that flips away and back, and of one that stays there; none where its frames have to stay."""
+    wrist = NAMES.index("R_Wrist")
+    for first, stop in ((200, 204), (200, MOTION.frames)):
+        rotations = np.array(MOTION.rotations)
+        rotations[first:stop, wrist] = rotations[first:stop, wrist] @ Rotation.from_rotvec([1.9, 0.0, 0.0]).as_matrix()
+        bad = replace(MOTION, rotations=rotations.astype(np.float32))
+        findings = check_motion(bad, BOUNDS)
+        assert "turn" in {one.figure for one in findings}
+        eased = ease(bad, findings, BOUNDS)
+        assert "turn" not in {one.figure for one in check_motion(eased, BOUNDS)}
+        np.testing.assert_array_equal(eased.rotations[:150], bad.rotations[:150])
+        kept = ease(bad, findings, BOUNDS, [Stretch(190, 215, BOUNDS)])
+        np.testing.assert_array_equal(kept.rotations[190:215], bad.rotations[190:215])
+
+
+def test_hands_that_are_too_fast_are_slowed():
+    """Only around the finding, and no more than needed."""
+    shoulder = NAMES.index("R_Shoulder")
+    amount = np.zeros(MOTION.frames)
+    amount[200:206] = 75.0 * np.sin(np.pi * np.arange(6) / 6) ** 2
+    turn = Rotation.from_rotvec(np.radians(amount)[:, None] * np.array([0.0, 0.0, 1.0]))
+    rotations = np.array(MOTION.rotations)
+    rotations[:, shoulder] = (turn * Rotation.from_matrix(rotations[:, shoulder])).as_matrix()
+    bad = replace(MOTION, rotations=rotations.astype(np.float32))
+    findings = [one for one in check_motion(bad, BOUNDS) if one.figure.startswith("wrist")]
+    assert {one.joint for one in findings} == {"R_Wrist"}
+    eased = ease(bad, findings, BOUNDS)
+    assert not [one for one in check_motion(eased, BOUNDS) if one.figure.startswith("wrist")]
+    np.testing.assert_array_equal(eased.rotations[:170], bad.rotations[:170])
+    np.testing.assert_array_equal(eased.rotations[240:], bad.rotations[240:])
+    kept = ease(bad, findings, BOUNDS, [Stretch(0, MOTION.frames, BOUNDS)])
+    np.testing.assert_array_equal(kept.rotations, bad.rotations)
+
+
 def test_legs_and_stretches_stay():
     knee = swung("L_Knee", (1.0, 0.0, 0.0), -70.0)
     findings = check_motion(knee, BOUNDS)

@@ -26,12 +26,14 @@ from a2g_jax.models.audio2gestures.stored import (
     clip_properties,
     control_names,
     log_weights,
+    request,
     stored_steps,
     widened,
 )
 from a2g_jax.models.base import Data
+from a2g_jax.models.control_curves import INCLUDED
 from a2g_jax.talker.skeleton import TALKER_SKELETON
-from a2g_jax.training.run import demo_run
+from a2g_jax.training.run import demo_run, open_run
 
 SIZE, STEPS, PARTS, CLIPS = 16, 8, 2, 60
 STORED = replace(
@@ -154,6 +156,30 @@ def test_gains_stretch_requests():
     weights = log_weights(NAMES, gains, SUMMARY, rows(height=0.7))
     steps = stored_steps(KEY, CODES, gains, jnp.int32(0), 256, SIZE, weights)[:, 0]
     assert property_of(steps, "height").mean() > plain + 0.2
+
+
+def test_the_gain_of_an_emotion_moves_codes_away_from_the_mean_of_all():
+    """By as much again as the mean of its clips lies there; where it is free, codes stay."""
+    summary = {**SUMMARY, "specific_code": np.asarray(CODES)}
+    labels = jnp.where(jnp.arange(4096) < 2048, jnp.nan, 1.0)
+    controls = rows(emotion=labels)
+    codes = np.asarray(CODES).mean(axis=1)
+    expected = codes[np.asarray(SUMMARY[LABELS]) == 1].mean(axis=0) - codes.mean(axis=0)
+    for gain in (1.5, 3.0):
+        sampling = replace(SAMPLING, control_gains=(f"{EMOTION}={gain}",))
+        asked = request(NAMES, sampling, summary, controls)
+        np.testing.assert_allclose(asked.shift[:32], 0.0)
+        np.testing.assert_allclose(asked.shift[32:], np.tile((gain - 1.0) * expected, (32, 1)), rtol=1e-3)
+        moved = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, *asked)
+        plain = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, asked.weights)
+        np.testing.assert_allclose(moved - plain, jnp.repeat(asked.shift, HOLD // SIZE, axis=0), atol=1e-2)
+    assert request(NAMES, SAMPLING, summary, controls).shift is None
+
+
+def test_included_runs_have_the_controls_that_messages_name():
+    for name, names in INCLUDED.items():
+        controls = open_run(name).config.build().controls
+        assert set(controls.names) == set(names)
 
 
 def test_gains_are_those_of_a_run_and_not_of_a_preset():

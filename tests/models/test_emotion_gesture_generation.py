@@ -12,6 +12,7 @@ from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
+from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.engine import Engine
 from a2g_jax.models.base import Condition
 from a2g_jax.models.emotion_gesture.chunks import seam
@@ -181,3 +182,48 @@ def test_a_motion_without_seed_poses_begins_in_one_of_the_calm_poses(audio):
     np.testing.assert_allclose(rows(run, audio[:40]), rows(run, audio[:40], seed_poses=seeds), atol=1e-6)
     with pytest.raises(InputError, match="the seed poses are 3 frames; the run needs 4 or more"):
         rows(run, audio[:40], seed_poses=seeds[:3])
+
+
+@pytest.mark.parametrize("timeline", ["anger", "neutral@0,anger@12.5,happiness@15"])
+def test_the_control_is_the_setting(audio, timeline):
+    """Of equal seeds, as lines of the settings and as an array of the caller."""
+    by_setting = rows(make_run(EmotionGestureSampling(emotion=timeline)), audio)
+    line = f"emotion={timeline}"
+    by_control = rows(make_run(EmotionGestureSampling(controls=(line,))), audio)
+    np.testing.assert_allclose(by_control, by_setting, atol=1e-5)
+    plain = make_run()
+    given = control_rows(plain, [line], FRAMES)
+    np.testing.assert_array_equal(rows(plain, audio, controls=given), by_control)
+    np.testing.assert_allclose(rows(plain, audio, window=256, controls=given), by_control, atol=1e-5)
+    assert np.abs(by_control - rows(plain, audio)).max() > 1e-2
+
+
+def test_where_the_control_is_free_the_emotion_is_the_speech_s(audio):
+    run = make_run()
+    given = np.full((FRAMES, 1), np.nan, np.float32)
+    np.testing.assert_array_equal(rows(run, audio, controls=given), rows(run, audio))
+    given[150:] = EMOTIONS.index("anger")
+    found, free = rows(run, audio, controls=given), rows(run, audio)
+    np.testing.assert_array_equal(found[:, :140], free[:, :140])
+    assert np.abs(found - free)[:, 160:].max() > 1e-2
+    assert np.isfinite(found).all()
+
+
+def test_an_emotion_that_is_chosen_twice_is_refused(audio):
+    with pytest.raises(InputError, match=r"--control 'emotion=anger' and --emotion 'neutral': both choose it"):
+        EmotionGestureSampling(emotion="neutral", controls=("emotion=anger",))
+    with pytest.raises(InputError, match=r"the run's controls are: emotion; 'demo' has rate\."):
+        make_run(EmotionGestureSampling(controls=("rate=0.9",))).config.build()
+    with pytest.raises(InputError, match="there is no 'angry' in the run; there are: anger, happiness, neutral"):
+        make_run(EmotionGestureSampling(controls=("emotion=angry",))).config.build()
+    run = make_run(EmotionGestureSampling(emotion="label"))
+    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
+    with pytest.raises(InputError, match="emotion and controls: both choose the emotion"):
+        rows(run, audio, emotion=weights, controls=np.zeros((FRAMES, 1), np.float32))
+
+
+def test_the_ablation_with_labels_follows_the_control(audio):
+    run = make_run(config=replace(CHUNKS, branches="label"))
+    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
+    controls = control_rows(run, ["emotion=anger"], FRAMES)
+    np.testing.assert_array_equal(rows(run, audio, controls=controls), rows(run, audio, emotion=weights))

@@ -61,10 +61,14 @@ def test_short_recordings_raise_the_extremes_of_the_source(tmp_path, source, toy
     assert (found["turn"][1:] > 0).any()
 
 
-def test_a_minute_of_new_recordings_replaces_those_of_the_source(source, toy_corpus):
+def test_a_minute_of_new_recordings_raises_those_of_the_source(source, toy_corpus):
+    """The tuned run moves like both."""
     whole = replace(toy_corpus, splits={"train": [Segment(index, 0, 300) for index in range(6)]})
-    found = corpus_extremes(whole, tuned_of(source, whole))
-    assert all((values < 1e4).all() for values in found.values())
+    config = tuned_of(source, whole)
+    found, own = corpus_extremes(whole, config), corpus_extremes(whole, replace(config, body_extremes=None))
+    for name, values in found.items():
+        np.testing.assert_allclose(values, np.maximum(own[name], source.run.config.body_extremes[name]))
+    assert (found["turn"][1:] > 0).any()
 
 
 def test_angles_are_from_the_mean_pose_of_the_run(toy_corpus, toy_run_config):

@@ -19,10 +19,11 @@ from a2g_jax.models.audio2gestures.stored import (
     EMOTION,
     LABELS,
     VALUES,
+    Request,
     clip_properties,
     control_names,
     emotion_names,
-    log_weights,
+    request,
     stored_steps,
 )
 from a2g_jax.models.base import Condition, Controls, Data, Model, Params, Stage, Summary, Update
@@ -41,8 +42,8 @@ class Given(NamedTuple):
 
     shared: Gaussian
     """The shared code S_A of the audio."""
-    weights: Float[Array, "H N P"] | None = None
-    """Log-weights of the parts of stored clips by the requested controls; None without a request."""
+    request: Request | None = None
+    """What controls request of the stored clips; None without a request."""
 
 
 #: Draws as in the papers.
@@ -83,17 +84,17 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         return {"specific_mean": jnp.mean(code, axis=1), "specific_std": jnp.std(code, axis=1)}
 
     def condition(params: Params, summary: Summary, given: Condition) -> Given:
-        """The shared code S_A of an audio, and the weights of stored clips by the requested controls."""
+        """The shared code S_A of an audio, and what controls request of the stored clips."""
         shared = codec.encode_audio(params, given.audio[None])
         if given.controls is None:
             return Given(shared)
-        return Given(shared, log_weights(names, sampling, summary, given.controls))
+        return Given(shared, request(names, sampling, summary, given.controls))
 
     def sample(
         params: Params, summary: Summary, key: Key[Array, ""], given: Given, start: Int[Array, ""]
     ) -> Float[Array, "T R D"]:
         """The motion g(S_A, I_R) for the output of :func:`condition`."""
-        codes = draw_codes(codec, sampling, params, summary, key, given.shared, start, given.weights)
+        codes = draw_codes(codec, sampling, params, summary, key, given.shared, start, given.request)
         return codec.decode(params, *codes)[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
@@ -163,7 +164,7 @@ def check_controls(
         why = "its poses have no wrists" if config.stored_codes else "it was trained without --stored-codes"
         raise InputError(f"--control {sampling.controls[0]!r}: the run has no controls, since {why}; use 'demo'.")
     parse_curves(sampling.controls, names, categories)
-    parse_gains(sampling.control_gains if names else (), [name for name in names if name not in categories])
+    parse_gains(sampling.control_gains if names else (), names)
 
 
 def draw_codes(
@@ -174,7 +175,7 @@ def draw_codes(
     key: Key[Array, ""],
     shared: Gaussian,
     start: Int[Array, ""],
-    clip_weights: Float[Array, "H N P"] | None = None,
+    requested: Request | None = None,
 ) -> tuple[Code, Code | None]:
     """The codes S_A and I_R that generation decodes: drawn, in time, edited.
 
@@ -182,17 +183,17 @@ def draw_codes(
         sampling: settings of the draw and of the edits.
         shared: output of ``condition``.
         start: first frame of the window in the whole audio, a multiple of 128.
-        clip_weights: log-weights of stored clips by the requested controls.
+        requested: what controls request of the stored clips.
     """
     config = codec.config
     edits = [parse_edit(text, config.dct_points) for text in sampling.all_edits]
-    drawn = _draw(codec, sampling, params, summary, key, shared, start, clip_weights)
+    drawn = _draw(codec, sampling, params, summary, key, shared, start, requested)
 
     def edited(place: int, name: str) -> Code:
         def other(edit: Edit) -> Code:
             # A sample number that --samples does not reach.
             again = jax.random.fold_in(key, 2**31 + int(edit.value))
-            code: Code = _draw(codec, sampling, params, summary, again, shared, start, clip_weights)[place]
+            code: Code = _draw(codec, sampling, params, summary, again, shared, start, requested)[place]
             return code
 
         chosen = [edit for edit in edits if edit.code == name]
@@ -203,7 +204,7 @@ def draw_codes(
     return edited(0, "shared"), None if drawn[1] is None else edited(1, "specific")
 
 
-def _draw(codec, sampling, params, summary, key, shared, start, clip_weights):
+def _draw(codec, sampling, params, summary, key, shared, start, requested):
     """Codes before any edit; I_R of training clips or of the mapping net, or standard normal without either."""
     config = codec.config
     frames, channels = shared.mean.shape[1:]
@@ -217,7 +218,8 @@ def _draw(codec, sampling, params, summary, key, shared, start, clip_weights):
     size = config.specific_frames
     if config.stored_codes:
         codes = summary["specific_code"]
-        steps = stored_steps(which, codes, sampling, start // size, frames // size, size, clip_weights)
+        weights, shift = (None, None) if requested is None else requested
+        steps = stored_steps(which, codes, sampling, start // size, frames // size, size, weights, shift)
         return audio_code, codec.specific_to_frames(steps[None])
     # One draw for each step, that of its first frame: a function of the key and the absolute frame alone.
     noise = sampling.noise_scale * frame_normal(noise_key, start, frames, channels)[::size]

@@ -6,7 +6,7 @@ part is drawn by the largest of ``log weight + Gumbel noise``, with one noise fo
 as it has what is requested, and the code changes no more often than the request needs.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -34,6 +34,15 @@ HOLD = 64
 PART_SECONDS = 4.0
 #: The control by the corpus's labels, and the summary's arrays of all controls.
 EMOTION, VALUES, LABELS = "emotion", "clip_properties", "clip_emotion"
+
+
+class Request(NamedTuple):
+    """What controls request of every hold of :data:`HOLD` frames."""
+
+    weights: Float[Array, "H N P"] | None
+    """Log-weights of the parts of stored clips; None for the same of all."""
+    shift: Float[Array, "H C"] | None = None
+    """What is added to the codes; None for nothing."""
 
 
 def control_names(config: Audio2GesturesConfig, data: Data) -> tuple[str, ...]:
@@ -76,6 +85,34 @@ def clip_properties(config: Audio2GesturesConfig, data: Data, names: tuple[str, 
         numbers = [known.index(name) if name else -1 for name in data.emotions]
         summary[LABELS] = jnp.array(numbers, jnp.int8)[batch.emotion]
     return summary
+
+
+def request(
+    names: tuple[str, ...], sampling: Audio2GesturesSampling, summary: Summary, controls: Float[Array, "T K"]
+) -> Request:
+    """Weights of the stored clips, and the shift of their codes, for requested controls; as in :func:`log_weights`."""
+    return Request(log_weights(names, sampling, summary, controls), emotion_shift(names, sampling, summary, controls))
+
+
+def emotion_shift(
+    names: tuple[str, ...], sampling: Audio2GesturesSampling, summary: Summary, controls: Float[Array, "T K"]
+) -> Float[Array, "H C"] | None:
+    """What the gain g of the emotion adds to codes, ``(g - 1) (mean of the emotion's codes - mean of all)``, for each
+    hold of :data:`HOLD` frames; zero where the emotion is free, None without a gain.
+
+    Clips of an emotion differ from others less once they are drawn for other speech: more is requested than they have,
+    as with the gains of the other controls.
+    """
+    gain = parse_gains(sampling.control_gains, names)[names.index(EMOTION)] if EMOTION in names else 1.0
+    if gain == 1.0:
+        return None
+    codes = jnp.mean(jnp.asarray(summary["specific_code"]).astype(jnp.float32), axis=1)
+    labels, label = jnp.asarray(summary[LABELS]).astype(int), controls.reshape(-1, HOLD, len(names))[:, HOLD // 2, -1]
+    number = jnp.nan_to_num(label).astype(int)
+    own = (labels[None] == number[:, None]).astype(codes.dtype)
+    means = own @ codes / jnp.maximum(own.sum(axis=1, keepdims=True), 1.0)
+    shift = (gain - 1.0) * (means - jnp.mean(codes, axis=0)[None])
+    return jnp.where(jnp.isnan(label)[:, None] | (own.sum(axis=1, keepdims=True) == 0), 0.0, shift)
 
 
 def log_weights(
@@ -139,6 +176,7 @@ def stored_steps(
     count: int,
     size: int,
     weights: Float[Array, "H N P"] | None = None,
+    shift: Float[Array, "H C"] | None = None,
 ) -> Float[Array, "count C"]:
     """Steps of the specific code from training clips, each taken from its beginning to its end.
 
@@ -148,6 +186,7 @@ def stored_steps(
         count: steps.
         size: frames of a step.
         weights: log-weights of the clips, of :func:`log_weights`; None for the same of all, as those of free controls.
+        shift: what is added to the steps of each hold, of :func:`emotion_shift`; None for nothing.
     """
     clips, length, _ = codes.shape
     number = jnp.maximum(first + jnp.arange(count), 0)
@@ -155,16 +194,17 @@ def stored_steps(
     period = max(1, -(-sampling.redraw_frames // (size * length))) * length if sampling.redraw_frames else 2**20
     draw = lambda n: jax.random.randint(jax.random.fold_in(key, n.astype(jnp.uint32)), (), 0, clips)  # noqa: E731
     later = (number % period) // length
+    hold = (number - first) * size // HOLD
     if weights is None:
         clip = jax.vmap(draw)(number // period) + later
     else:
-        hold = (number - first) * size // HOLD
         noise = jax.vmap(lambda n: _noise(jax.random.fold_in(key, n.astype(jnp.uint32)), clips, draw(n)))
         part = (number % length) * weights.shape[2] // length
         clip = jax.vmap(_best)(noise(number // period), weights[hold, :, part], later) + later
     steps = codes[clip % clips, number % length].astype(jnp.float32)
     mean = jnp.mean(codes.astype(jnp.float32), axis=(0, 1))
-    return mean[None] + sampling.noise_scale * (steps - mean[None])
+    scaled = mean[None] + sampling.noise_scale * (steps - mean[None])
+    return scaled if shift is None else scaled + shift[hold]
 
 
 def _noise(key: Key[Array, ""], clips: int, drawn: Int[Array, ""]) -> Float[Array, " N"]:

@@ -29,6 +29,8 @@ class Given(NamedTuple):
     """The audio of the frame ``seed_frames`` before each."""
     emotion: Float[Array, "T E"]
     """Weights of the emotions; NaN for those of the audio."""
+    requested: Float[Array, "T E"] | None = None
+    """The same by a control, in place of ``emotion`` and sampled whatever the settings are; None without a control."""
 
 
 class State(NamedTuple):
@@ -72,8 +74,9 @@ def proceed(
     def one(state: State, inputs: tuple[Array, AudioFeatures]) -> tuple[State, Float[Array, "S C"]]:
         row, features = inputs
         own = jax.random.fold_in(key, ((first + row) // stride).astype(jnp.uint32))
-        weights = _cut(given.emotion, row, stride)
-        new = _chunk(networks, params, sampling, own, features, weights, state.seed)
+        controlled = given.requested is not None
+        weights = _cut(given.emotion if given.requested is None else given.requested, row, stride)
+        new = _chunk(networks, params, sampling, own, features, weights, state.seed, controlled)
         after = State(jnp.concatenate([state.seed, new])[-len(state.seed) :], new)
         # The last chunk may begin after the window; it is then the next window's.
         return jax.tree.map(lambda a, b: jnp.where(row < frames, a, b), after, state), new
@@ -101,12 +104,17 @@ def _chunk(
     features: AudioFeatures,
     weights: Float[Array, "S E"],
     seed: Float[Array, "M C"],
+    controlled: bool,
 ) -> Float[Array, "S C"]:
-    """The poses of a chunk after its initial ones."""
+    """The poses of a chunk after its initial ones.
+
+    Args:
+        controlled: whether the weights are a control's.
+    """
     config, space = networks.config, networks.data.space
     weights = jnp.concatenate([jnp.broadcast_to(weights[:1], (config.seed_frames, weights.shape[1])), weights])[None]
     labels = jnp.where(jnp.isnan(weights), 1.0 / networks.classes, weights)
-    samples = networks.samples_emotions and sampling.emotion != AUDIO
+    samples = networks.samples_emotions and (controlled or sampling.emotion != AUDIO)
     if samples and features.emotion is not None and features.logits is not None:
         if sampling.emotion == SAMPLE:
             found = emotion_probabilities(features.logits, config.clip_frames)

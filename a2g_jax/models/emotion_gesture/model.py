@@ -1,5 +1,6 @@
 """EmotionGesture as a record of pure functions."""
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,9 +14,11 @@ from jaxtyping import Array, Float, Int, Key
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
 from a2g_jax.models.base import Condition, Data, Model, Params, Stage, Summary, Update
+from a2g_jax.models.control_curves import parse_curves
 from a2g_jax.models.emotion_gesture import chunks
 from a2g_jax.models.emotion_gesture.chunks import Given, State
 from a2g_jax.models.emotion_gesture.config import EmotionGestureConfig
+from a2g_jax.models.emotion_gesture.controls import emotion_controls, requested_emotion
 from a2g_jax.models.emotion_gesture.networks import Networks
 from a2g_jax.models.emotion_gesture.objective import (
     average_loss,
@@ -27,7 +30,7 @@ from a2g_jax.models.emotion_gesture.objective import (
 )
 from a2g_jax.models.emotion_gesture.sampling import AUDIO, LABEL, EmotionGestureSampling
 from a2g_jax.models.emotion_gesture.word_table import fill_table
-from a2g_jax.models.emotion_timeline import check_emotions, emotion_rows, parse_timeline
+from a2g_jax.models.emotion_timeline import FADE, check_emotions, emotion_rows, parse_timeline
 from a2g_jax.models.optimiser import make_optimiser
 from a2g_jax.models.train_config import TrainConfig
 
@@ -49,7 +52,11 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
             of it.
     """
     networks = Networks(config, data)
+    controls = emotion_controls(networks)
     _check_sampling(networks, sampling)
+    if sampling.controls:
+        names, categories = ((), {}) if controls is None else (controls.names, controls.categories)
+        parse_curves(sampling.controls, names, categories)
     conditioned = sampling.emotion == LABEL or sampling.names_emotions or config.branches == "label"
 
     def summarise(params: Params, key: Key[Array, ""], batch: Batch) -> Summary:
@@ -69,7 +76,11 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         if emotion is None:
             emotion = jnp.full((len(audio), networks.classes), jnp.nan)
         before = jnp.concatenate([jnp.repeat(audio[:1], config.seed_frames, axis=0), audio[: -config.seed_frames]])
-        return Given(audio, before, emotion)
+        if given.controls is None:
+            return Given(audio, before, emotion)
+        if given.emotion is not None:
+            raise InputError("emotion and controls: both choose the emotion; give one of them.")
+        return Given(audio, before, emotion, requested_emotion(networks, given.controls))
 
     def begin(
         params: Params, summary: Summary, key: Key[Array, ""], seed_poses: Float[Array, "S R D"] | None = None
@@ -120,7 +131,7 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         "emotion_gesture",
         config,
         config.clip_frames,
-        max(config.seed_frames, config.stride - 1),
+        max(config.seed_frames, config.stride - 1, math.ceil(FADE * data.fps)),
         networks.init,
         _stages(networks),
         summarise,
@@ -128,7 +139,12 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         finish=finish if config.averages else None,
         use_words=use_words if reads and config.word_vectors else None,
         condition=condition,
-        condition_fields=("audio", "seed_poses", *(("emotion",) if conditioned else ())),
+        condition_fields=(
+            "audio",
+            "seed_poses",
+            *(("emotion",) if conditioned else ()),
+            *(() if controls is None else ("controls",)),
+        ),
         requested=requested,
         sample=sample,
         begin=begin,
@@ -136,6 +152,7 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         seed_frames=config.seed_frames,
         lookahead=config.stride - 1,
         overlap=config.stride - 1,
+        controls=controls,
         reconstruct=reconstruct,
     )
 
