@@ -35,7 +35,7 @@ def test_each_description_has_its_own(toy_run_config, monkeypatch):
     again.clear()
     assert parameter_shapes(toy_run_config(steps=7)) == first
     with pytest.raises(pytest.fail.Exception, match="traced again"):
-        parameter_shapes(dataclasses.replace(labelled, corpus={**config.corpus, "speakers": ["ada"]}))
+        parameter_shapes(dataclasses.replace(labelled, corpus={**config.corpus, "speakers": ["ada", "zoe"]}))
 
 
 def test_settings_that_cannot_be_written_are_traced(toy_run_config, monkeypatch):
