@@ -13,8 +13,8 @@ import pytest
 from websockets.sync.client import connect
 
 from a2g_jax.generation.delivery import Delivery
-from a2g_jax.io.character import read_character
 from a2g_jax.io.audio import write_audio
+from a2g_jax.io.character import read_character
 from a2g_jax.serving import client
 from a2g_jax.serving.client import converse
 from a2g_jax.serving.live.drawn import Drawn
@@ -64,7 +64,7 @@ def test_json_frames_and_the_end(live, motion):
         found = json.loads(message)
         frames += found.get("frames", []) if found["type"] == "frames" else []
         last = found
-    assert last == {"type": "end", "frames": motion.frames, "seconds": 1.0}
+    assert last == {"type": "end", "total": motion.frames, "seconds": 1.0}
     assert client.close_code == 1000
     assert [frame["index"] for frame in frames] == list(range(motion.frames))
     np.testing.assert_allclose([frame["rotations"] for frame in frames], quaternions(motion), atol=1e-6)
@@ -173,7 +173,7 @@ def test_frames_of_a_character_are_those_of_its_file(live, motion, kind, tmp_pat
 def test_the_example_of_the_guide(live, capsys):
     guide = (Path(__file__).parents[2] / "docs" / "live.md").read_text(encoding="utf-8")
     example = next(block for block in re.findall(r"```python\n(.*?)```", guide, re.DOTALL) if "websockets" in block)
-    exec(compile(example.replace("ws://127.0.0.1:8765/live", socket_url(live.url)), "live.md", "exec"), {})  # noqa: S102
+    exec(compile(example.replace("ws://127.0.0.1:8765/live", socket_url(live.url)), "live.md", "exec"), {})
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 1 + 60
     assert printed[-1].startswith("59 [")
