@@ -36,6 +36,7 @@ class Live {
 
   become(state) {
     this.state = state;
+    clearTimeout(this.stage.settling);
     at("speak").setAttribute("aria-pressed", state !== "idle");
     at("speak-text").textContent = state === "idle" ? "Speak" : "Stop";
     at("delays").hidden = state !== "live";
