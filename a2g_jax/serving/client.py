@@ -128,8 +128,8 @@ def main(arguments: list[str] | None = None) -> int:
     if options.out:
         joints = np.array(received.ready["skeleton"]["joints"])
         with atomic_path(options.out) as temporary, temporary.open("wb") as file:
-            arrays = {"rotations": np.array(received.rotations), "root": np.array(received.root)}
-            np.savez(file, joints=joints, fps=fps, **arrays)
+            rotations, root = np.array(received.rotations), np.array(received.root)
+            np.savez(file, rotations=rotations, root=root, joints=joints, fps=fps)
     return 0
 
 

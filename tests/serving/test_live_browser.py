@@ -79,7 +79,7 @@ def test_the_figure_follows_the_microphone(browser, live):
         assert page.inner_text("#behind").endswith(" s")
         page.click("#speak")
         assert page.evaluate("a2gLive.state()") == "idle"
-        for _ in range(600):
+        for _ in range(2400):
             if live.service.clients == 0:
                 break
             page.wait_for_timeout(50)

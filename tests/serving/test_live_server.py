@@ -64,7 +64,7 @@ def test_json_frames_and_the_end(live, motion):
         found = json.loads(message)
         frames += found.get("frames", []) if found["type"] == "frames" else []
         last = found
-    assert last == {"type": "end", "frames": motion.frames, "seconds": 1.0}
+    assert last == {"type": "end", "total": motion.frames, "seconds": 1.0}
     assert client.close_code == 1000
     assert [frame["index"] for frame in frames] == list(range(motion.frames))
     np.testing.assert_allclose([frame["rotations"] for frame in frames], quaternions(motion), atol=1e-6)

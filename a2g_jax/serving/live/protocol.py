@@ -19,7 +19,7 @@ from a2g_jax.geometry.motion import Motion
 #: Version of the protocol, in the first message of the server.
 VERSION = 1
 #: Types of samples by the name of their encoding.
-ENCODINGS = {"s16le": np.dtype("<i2"), "f32le": np.dtype("<f4")}
+ENCODINGS: dict[str, np.dtype[Any]] = {"s16le": np.dtype("<i2"), "f32le": np.dtype("<f4")}
 #: What frames are sent as.
 REPLIES = ("json", "binary", "points")
 #: Most characters of the text messages of a client.

@@ -108,7 +108,7 @@ class Session:
                     raise Refusal(MALFORMED, 'text after the first message: expected {"type": "end"}.')
                 await self._give(await self.service.compute(_made, stream.finish, encode, self._sent))
                 await self._send(
-                    json.dumps({"type": "end", "frames": self._sent, "seconds": round(self._pace.seconds, 6)})
+                    json.dumps({"type": "end", "total": self._sent, "seconds": round(self._pace.seconds, 6)})
                 )
                 await self.websocket.close(1000, "end")
                 return

@@ -158,6 +158,7 @@ def _figure(figure: Figure) -> dict:
         raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
     shape = build_shape(motion.skeleton)
     points = shape_points(motion, shape)
+    encoded = encode_positions(points, figure.label)
     return {
         "label": figure.label,
         "note": figure.note,
@@ -165,7 +166,7 @@ def _figure(figure: Figure) -> dict:
         "tracks": [track.encoded() for track in figure.tracks],
         "files": list(figure.files),
         **drawn_body(motion, shape, points),
-        **encode_positions(points, figure.label),
+        **encoded,
     }
 
 

@@ -1,7 +1,7 @@
 // Microphone -> server -> figure.
 
 const SHOWN_BEHIND = 0.12; // seconds between the newest frame and the one that is shown
-const BACKLOG = 3; // seconds of audio that wait to be sent when server or connection are too slow
+const BACKLOG = 10; // seconds of audio without frames, from which on server or connection are too slow
 
 const at = (id) => document.getElementById(id);
 const seconds = (value) => `${value.toFixed(2)} s`;
@@ -36,6 +36,7 @@ class Live {
 
   become(state) {
     this.state = state;
+    clearTimeout(this.stage.settling);
     at("speak").setAttribute("aria-pressed", state !== "idle");
     at("speak-text").textContent = state === "idle" ? "Speak" : "Stop";
     at("delays").hidden = state !== "live";
@@ -96,7 +97,7 @@ class Live {
     this.began = null;
     capture.port.onmessage = ({ data }) => {
       if (this.socket.readyState !== WebSocket.OPEN) return;
-      if (this.socket.bufferedAmount > BACKLOG * 2 * rate) { this.stop("The server is too slow for this: choose a run that computes less, or close other programs.", true); return; }
+      if (this.sent - this.frames / this.figure.fps > this.latency + BACKLOG) { this.stop("The server is too slow for this: choose a run that computes less, or close other programs.", true); return; }
       this.socket.send(data);
       this.sent += data.length / rate;
       this.heard = performance.now();

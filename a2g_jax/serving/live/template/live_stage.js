@@ -26,8 +26,11 @@ class LiveStage {
     this.pending = requestAnimationFrame((stamp) => {
       this.pending = 0;
       const more = this.ticking ? this.ticking(stamp) : false;
-      this.draw(!more);
+      this.draw(false);
+      clearTimeout(this.settling);
       if (more) this.wake();
+      // A picture that stays a while is drawn again at full quality, where the moving one is simpler.
+      else if (this.renderer.software || this.renderer.scale < 1) this.settling = setTimeout(() => this.draw(true), 400);
     });
   }
 
