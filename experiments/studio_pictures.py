@@ -30,13 +30,12 @@ MOMENT = 4.2
 
 def generated(studio: Studio) -> None:
     """Two takes, one with stars."""
-    for request in ({"samples": 3, "seed": 4}, {"samples": 2, "seed": 1, "controls": {"energy": 0.9}}):
+    for request in ({"samples": 2, "seed": 1, "controls": {"energy": 0.9}}, {"samples": 3, "seed": 4}):
         take = studio.request({"speech": "demo", "system": "demo", **request})
         if not studio.jobs.wait(take.job, 600.0) or take.job.error is not None:
             raise SystemExit(f"{take.job.title}: {take.job.error or 'takes too long'}")
-    first = min(studio.takes.values(), key=lambda take: take.number)
     for sample, stars in ((0, 4), (1, 5)):
-        studio.rate(first.id, {"sample": sample, "stars": stars})
+        studio.rate(take.id, {"sample": sample, "stars": stars})
 
 
 @contextmanager
@@ -57,10 +56,9 @@ def opened(browser: Any, url: str, size: tuple[int, int], dark: bool) -> Iterato
         view.close()
 
 
-def looked_at(view: Any, take: int) -> None:
-    """Play a take at the moment of the picture."""
-    view.locator(".take", has_text=f"Take {take}").locator("button", has_text="Show").click()
-    view.frame_locator("#player").locator("#labels button").nth(1).wait_for(timeout=120_000)
+def looked_at(view: Any) -> None:
+    """Wait for the newest take, which the page shows, and go to the moment of the picture."""
+    view.frame_locator("#player").locator("#labels button").nth(2).wait_for(timeout=120_000)
     frame = next(frame for frame in view.frames if "/page?show=" in frame.url)
     frame.evaluate("a2gPlayer.ready")
     frame.evaluate("time => a2gPlayer.seek(time)", MOMENT)
@@ -70,7 +68,7 @@ def looked_at(view: Any, take: int) -> None:
 
 def shot(view: Any, **options: Any) -> Image.Image:
     """A picture of the page."""
-    return Image.open(io.BytesIO(view.screenshot(type="png", **options))).convert("RGB")
+    return Image.open(io.BytesIO(view.screenshot(type="png", timeout=120_000, **options))).convert("RGB")
 
 
 def beside(left: Image.Image, right: Image.Image, gap: int = 24) -> Image.Image:
@@ -87,7 +85,7 @@ def states(browser: Any, url: str, out: Path) -> None:
         for dark in (False, True):
             name = f"studio_{size[0]}_{'dark' if dark else 'light'}"
             with opened(browser, url, size, dark) as view:
-                looked_at(view, 1)
+                looked_at(view)
                 save(shot(view, full_page=size == PHONE), out / f"{name}.png")
                 for fold in view.locator("form > details:visible > summary").all():
                     fold.click()
@@ -98,9 +96,9 @@ def states(browser: Any, url: str, out: Path) -> None:
 
 
 def save(picture: Image.Image, path: Path) -> None:
-    """Write a PNG with few colours, which is half as large."""
+    """Write a PNG."""
     with atomic_path(path) as temporary:
-        picture.quantize(256, dither=Image.Dither.NONE).save(temporary, format="PNG", optimize=True)
+        picture.save(temporary, format="PNG", optimize=True)
 
 
 def main() -> None:
@@ -119,10 +117,12 @@ def main() -> None:
             browser = playwright.chromium.launch(executable_path=find_browser(), args=list(BROWSER_ARGUMENTS))
             try:
                 with opened(browser, url, DESK, dark=False) as view:
-                    looked_at(view, 1)
+                    looked_at(view)
                     desk = shot(view)
                 with opened(browser, url, PHONE, dark=True) as view:
-                    view.locator(".control, #emotion .chip").first.wait_for(state="attached")
+                    looked_at(view)
+                    view.evaluate("document.getElementById('stage').scrollIntoView()")
+                    view.wait_for_timeout(500)
                     phone = shot(view)
                 save(beside(desk, phone), options.out / "studio.png")
                 if options.all:

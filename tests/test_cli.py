@@ -41,7 +41,7 @@ def fails(capsys, *arguments: str) -> str:
     return error[0]
 
 
-COMMANDS = ("demo", "talk", "prepare", "train", "inspect", "evaluate", "retarget", "generate")
+COMMANDS = ("demo", "talk", "prepare", "train", "inspect", "evaluate", "retarget", "generate", "studio")
 
 #: Arguments that are refused before JAX or NumPy is imported, and the message. The files that exist are empty.
 REFUSED_EARLY = {
@@ -50,6 +50,9 @@ REFUSED_EARLY = {
     "demo --compare --order best": "--order: orders the samples of one run; leave it out with --compare.",
     "demo --order worst": "argument --order: invalid choice: 'worst'",
     "demo --formats gif": "no format 'gif'; there are: bvh, npz, html",
+    "studio no": "no: is not a run (no run.json in it);",
+    "studio --port 99999": "argument --port: expected a whole number from 0 to 65535; got '99999'",
+    "studio --hots x": "unknown argument --hots",
     "talk --out o --corpus no": "no: is not a corpus (no manifest.json in it); make one with 'a2g prepare'.",
     "talk --out o --formats ,": "no format in ','",
     "prepare folder no --out c": "no: there is no such folder; check the path.",

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from a2g_jax.cli import generate, sampling
 from a2g_jax.cli.argument_types import number
@@ -157,7 +157,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
     label, lanes = about.pop("label", ""), about.pop("lanes", ())
     job.say("generating")
     # Where 'a2g generate' orders samples by a score, the page offers that order.
-    order = {"order": "best"} if "order" in vars(options) else {}
+    order: dict[str, Any] = {"order": "best"} if "order" in vars(options) else {}
     export(
         ready.run,
         checked,

@@ -6,10 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from a2g_jax.errors import Interrupted
 from a2g_jax.features.dynamics import EDGES, Dynamics
 from a2g_jax.generation.engine import Engine
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Model, Stage, Update
+from a2g_jax.progress import watched
 from a2g_jax.training.run_config import Run, RunConfig
 
 FRAMES, RATE = 300, 16000 / 30
@@ -68,6 +70,24 @@ def test_windows_hold_their_frames(toy_run_config, window, monkeypatch):
     np.testing.assert_allclose(rows[:, 0, 2], ramp, atol=0.01)
     assert set(rows[:, 0, 3]) == {3.0}
     assert set(rows[:, 0, 4]) == {7.0}
+
+
+def test_generation_ends_between_windows_where_a_watcher_raises(toy_run_config, monkeypatch):
+    monkeypatch.setattr(RunConfig, "build", lambda config: recorder(config.space)._replace(seed_frames=0))
+    config = toy_run_config()
+    engine, drawn = Engine(Run(config, {}, {}, 0), 128), []
+    monkeypatch.setattr(engine, "_condition", lambda *_: None)
+    monkeypatch.setattr(engine, "_sample", lambda *arguments: drawn.append(1) or np.zeros((128, *config.space.shape)))
+
+    def watcher(done, total, unit):
+        if len(drawn) == 2:
+            raise Interrupted("enough")
+
+    given = Condition(audio=np.zeros((FRAMES, config.mel.width), np.float32))
+    with watched(watcher), pytest.raises(Interrupted, match="enough"):
+        list(engine.rows(given, 5))
+    assert len(drawn) == 2
+    assert len(list(engine.rows(given, 1))) == 1
 
 
 def test_gains_of_a_run_act_on_the_whole_motion(toy_run_config, monkeypatch):

@@ -80,13 +80,12 @@ class Job:
         return (time.monotonic() if self.ended is None else self.ended) - self.started
 
     def rate(self) -> float | None:
-        """Steps a second; None before there are two."""
-        if self.first is None or self.done == 0:
+        """Steps a second after the first one, which includes preparations; None before there are two."""
+        if self.first is None or self.done < 2:
             return None
         since = (time.monotonic() if self.ended is None else self.ended) - self.first
-        if self.done > 1 and since > 0.2:
-            return (self.done - 1) / since
-        return self.done / max(self.seconds(), 1e-3)
+        # Steps that are reported at once were made together with the first.
+        return (self.done - 1) / since if since > 0.2 else self.done / max(self.seconds(), 1e-3)
 
     def remaining(self) -> float | None:
         """Estimated seconds to the end, from its own rate or from similar work; None if neither is known."""

@@ -31,7 +31,11 @@ export function update(state) {
   for (const take of takes) {
     if (mine.has(take.id) && ENDED.includes(take.job.state)) {
       mine.delete(take.id);
-      if (take.job.state === "done") { showTake(take); tell(`take ${take.number} is done`); }
+      if (take.job.state === "done") {
+        showTake(take);
+        tell(`take ${take.number} is done`);
+        if (innerWidth <= 860) find("stage").scrollIntoView();
+      }
       if (take.job.state === "failed" && take.job.error.field) showError(take.job.error.field, take.job.error.message);
     }
     for (const sample of take.samples || []) for (const [format, job] of Object.entries(sample.films)) {

@@ -34,7 +34,7 @@ class Lane {
     parts.push(svg("path", { class: "wave-back", d: path.join("") }));
     const every = [0.5, 1, 2, 5, 10, 20, 30, 60, 120].find((step) => (this.width - 2 * EDGE) * step / this.seconds >= 44) || 300;
     for (let second = 0; second <= this.seconds + 1e-6; second += every) {
-      const text = svg("text", { class: "tick", x: this.x(second), y: this.height - 2 });
+      const text = svg("text", { class: "tick", x: Math.max(this.x(second), 16), y: this.height - 4 });
       text.textContent = `${number(second, 1)} s`;
       if (this.x(second) < this.width - 18) parts.push(svg("line", { class: "tick-line", x1: this.x(second), x2: this.x(second), y1: 0, y2: this.height - 14 }), text);
     }
