@@ -122,9 +122,9 @@ class Mannequin:
             # Brows that arch and a mouth whose corners are up: level ones look sad from above.
             arch = at(sign * 0.032, 0.0885, 0.0790)
             part(at(sign * 0.020, 0.0915, 0.0815), arch, (0.0036, 0.0036), "hair")
-            part(arch, at(sign * 0.045, 0.0915, 0.0725), (0.0036, 0.0028), "hair")
-            corner = at(sign * 0.0205, 0.1635, 0.0740)
-            part(at(0, 0.1695, 0.0790), corner, (0.0058, 0.0036), "lips", frame=frame, axis=1, flat=0.6)
+            part(arch, at(sign * 0.045, 0.0915, 0.0725), (0.0036, 0.0032), "hair")
+            corner = at(sign * 0.0205, 0.1645, 0.0740)
+            part(at(0, 0.1690, 0.0790), corner, (0.0058, 0.0036), "lips", frame=frame, axis=1, flat=0.6)
 
     def head_frame(self, head: int) -> tuple[int, float]:
         """A frame at the head's joint, and the height of the crown above it, metres."""
