@@ -128,10 +128,7 @@ def before(text, here):
         assert main(["prepare", "talker", "--minutes", "1", "--out", "corpus"]) == 0
     needs_run = re.search(r"(generate|evaluate) run\b", text) or "run_seed" in text or "--resume" in text
     if needs_run and not (here / "run").exists():
-        assert (
-            main(["train", "audio2gestures", "--corpus", "corpus", "--out", "run", *SMALL, "--adversarial-steps", "2"])
-            == 0
-        )
+        assert main(shortened(["train", "audio2gestures", "--corpus", "corpus", "--out", "run"])) == 0
     if "run_seed" in text:
         pytest.skip("needs runs of several seeds; tests/evaluation/test_seeds.py has them")
 
