@@ -87,7 +87,7 @@ class Scorer:
     def _octaves(self, motion: Motion) -> float:
         """How far the size of a motion is from that of the training motion."""
         config = self._run.config
-        z = np.asarray(config.statistics["pose"].normalise(config.space.write(motion.rotations)))
+        z = np.asarray(config.statistics["pose"].normalise(config.space.write(np.asarray(motion.rotations))))
         size = float(np.sqrt(np.mean(np.square(z))))
         return abs(float(np.log2(max(size, 1e-3))))
 

@@ -20,7 +20,7 @@ def unusual_speech(run: Run, audio: Any, sample_rate: int | None = None) -> tupl
         >>> a2g_jax.unusual_speech(run, speech)
         ()
         >>> [one.figure for one in a2g_jax.unusual_speech(run, speech, 32000)]  # at twice its pitch
-        ['pitch']
+        ['pitch', 'spectrum']
 
     Args:
         run: without ``speech.json`` in its folder nothing is outside.

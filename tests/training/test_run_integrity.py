@@ -23,7 +23,6 @@ from a2g_jax.training.checkpoint import Checkpoints
 from a2g_jax.training.loop import train
 from a2g_jax.training.run import load_run, save_run
 from a2g_jax.training.run_file import SHIPPED
-from a2g_jax.training.run_file import run_folder as shipped_folder
 from a2g_jax.training.state import TrainState
 from a2g_jax.training.vanished import zero_gradient
 from tests.disk_for_tests import small_files
@@ -342,4 +341,4 @@ def test_values_of_other_types_in_run_json_are_one_line_with_its_name(run_folder
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shapes_of_the_weights_of_the_package_are_right(name):
     """They are not compared whenever one opens them, which takes a second."""
-    load_run(shipped_folder(name), check_shapes=True)
+    load_run(PACKAGE / SHIPPED[name], check_shapes=True)

@@ -115,13 +115,16 @@ class Mannequin:
         part(at(0, 0.094, -0.018), at(0, 0.084, -0.012), (0.094, 0.088), "hair", flat=0.90, **oval)
         part(at(0, 0.135, -0.034), at(0, 0.09, -0.018), (0.066, 0.09), "hair", flat=0.93, **oval)
         part(at(0, 0.118, 0.086), at(0, 0.139, 0.097), (0.007, 0.0125), "skin")
-        mouth = [at(sign * 0.014, 0.168, 0.0775) for sign in (1.0, -1.0)]
-        part(mouth[0], mouth[1], (0.0062, 0.0062), "lips", frame=frame, axis=1, flat=0.6)
         for sign in (1.0, -1.0):
             ear = [at(sign * 0.076, 0.129, 0.004), at(sign * 0.079, 0.112, 0.0)]
             part(ear[0], ear[1], (0.012, 0.017), "skin", flat=0.5, **oval)
             part(at(sign * 0.030, 0.1145, 0.0755), at(sign * 0.030, 0.1125, 0.0755), (0.0088, 0.0088), "eye")
-            part(at(sign * 0.019, 0.0905, 0.0815), at(sign * 0.043, 0.0945, 0.0735), (0.0036, 0.0032), "hair")
+            # Brows that arch and a mouth whose corners are up: level ones look sad from above.
+            arch = at(sign * 0.032, 0.0885, 0.0790)
+            part(at(sign * 0.020, 0.0915, 0.0815), arch, (0.0036, 0.0036), "hair")
+            part(arch, at(sign * 0.045, 0.0915, 0.0725), (0.0036, 0.0032), "hair")
+            corner = at(sign * 0.0205, 0.1645, 0.0740)
+            part(at(0, 0.1690, 0.0790), corner, (0.0058, 0.0036), "lips", frame=frame, axis=1, flat=0.6)
 
     def head_frame(self, head: int) -> tuple[int, float]:
         """A frame at the head's joint, and the height of the crown above it, metres."""
