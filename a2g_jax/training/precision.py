@@ -80,5 +80,6 @@ def _rounded_part(part: Any) -> Any:
 
 
 def _rounded_program(program: core.Jaxpr, constants: Sequence[Any]) -> core.ClosedJaxpr:
-    shapes = [jax.ShapeDtypeStruct(atom.aval.shape, atom.aval.dtype) for atom in program.invars]
+    kinds: list[Any] = [atom.aval for atom in program.invars]
+    shapes = [jax.ShapeDtypeStruct(kind.shape, kind.dtype) for kind in kinds]
     return jax.make_jaxpr(lambda *inputs: _evaluate(program, constants, inputs))(*shapes)
