@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from a2g_jax.cli import generate, sampling
 from a2g_jax.cli.argument_types import number
@@ -156,8 +156,6 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
     about = {**ready.about}
     label, lanes = about.pop("label", ""), about.pop("lanes", ())
     job.say("generating")
-    # Where 'a2g generate' orders samples by a score, the page offers that order.
-    order: dict[str, Any] = {"order": "best"} if "order" in vars(options) else {}
     export(
         ready.run,
         checked,
@@ -170,7 +168,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         label=label,
         report=lambda done: job.step(done, options.samples, "sample"),
         delivery=ready.delivery,
-        **order,
+        order="best",
     )
     write_audio(folder / SPEECH, ready.audio, rate)
     described = [describe_findings(report.findings, ready.run.config.fps) for report in checked.reports]

@@ -52,7 +52,7 @@ class TrainConfig:
     """Networks that are not trained, such as audio_encoder."""
     precision: str = "float32"
     """'float32', or 'bf16': products and convolutions of the networks take bfloat16 and add up in float32, in which
-    parameters, optimisers and losses stay; faster on GPUs and on CPUs with AVX-512 or AMX for bfloat16."""
+    parameters, optimisers and losses stay; for GPUs: on a CPU operands are rounded alike, and nothing is faster."""
     tensorboard: bool = False
     """Also write TensorBoard event files (needs the 'tensorboard' extra)."""
 

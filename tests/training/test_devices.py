@@ -38,7 +38,9 @@ def weights_after(corpus, devices, steps, **changes):
     return losses, jax.device_get(state.params)
 
 
-@pytest.mark.parametrize("megabytes", [2000.0, 0.0], ids=["on devices", "from disk"])
+@pytest.mark.parametrize(
+    "megabytes", [pytest.param(2000.0, marks=pytest.mark.slow), 0.0], ids=["on devices", "from disk"]
+)
 def test_two_devices_train_as_one(toy_corpus, megabytes):
     """The suite has two virtual devices (tests/conftest.py)."""
     one, two = (weights_after(toy_corpus, number, 4, device_megabytes=megabytes) for number in (1, 2))
