@@ -53,7 +53,7 @@ def commands(page: str) -> list[Command]:
     found = []
     for first, block in blocks(page, "sh", "bash", "console"):
         for number, line in enumerate(block.splitlines()):
-            text = line.split(" #")[0].strip()
+            text = re.split(r" [#>]", line)[0].strip()  # neither comments nor where output goes
             found += [Command(page, first + number, part.strip()) for part in text.split("&&") if part.strip()]
     return [one for one in found if not one.text.startswith("#")]
 
