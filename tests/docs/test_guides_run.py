@@ -47,7 +47,7 @@ NOT_HERE = {
     "my_package": "is of a package that CONTRIBUTING invents; tests/plugin has one",
     "A2G_MODELS": "is of a package that CONTRIBUTING invents",
     "http.server": "starts a server",
-    "PATH ": "stands for any path",
+    " PATH": "stands for any path",
     "--score": "needs Matplotlib and minutes; tests/inspection run it",
     "demo-emotion": "is run by tests/test_demo_emotions.py",
     "--emotions": "is run by tests/test_demo_emotions.py",
@@ -131,7 +131,10 @@ def test_commands_run_in_order(page, here):
 
 
 def before(text, here):
-    """Make what a page takes from another one."""
+    """Make what a page takes from another one; remove what a page makes in two ways."""
+    out = re.search(r"--out (\S+)", text)
+    if out and re.match(r"a2g (prepare|train)\b", text) and "--resume" not in text:
+        shutil.rmtree(here / out[1], ignore_errors=True)
     if "--corpus corpus" in text and not (here / "corpus").exists():
         assert main(["prepare", "talker", "--minutes", "1", "--out", "corpus"]) == 0
     needs_run = re.search(r"(generate|evaluate) run\b", text) or "run_seed" in text or "--resume" in text
