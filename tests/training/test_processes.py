@@ -54,7 +54,7 @@ def begin_two(out, corpus, settings, resume=False, other=None):
 
 def end(*processes, status=0):
     """Standard errors of processes that end."""
-    outputs = [process.communicate(timeout=600)[1] for process in processes]
+    outputs = [process.communicate(timeout=3000)[1] for process in processes]
     assert [process.returncode for process in processes] == [status] * len(processes), "\n".join(outputs)
     return outputs
 
@@ -77,11 +77,21 @@ def assert_close(first, second, rtol=1e-4, atol=1e-4):
         np.testing.assert_allclose(other[name], one[name], atol=atol, err_msg=name)
 
 
+@pytest.fixture(scope="module")
+def emotional_corpus(tmp_path_factory):
+    """Three generated minutes with emotions, which some models need."""
+    from a2g_jax.data.generated import TalkerOptions
+    from a2g_jax.data.prepare import prepare_talker
+
+    options = TalkerOptions(minutes=3.0, emotions=("happiness", "sadness"))
+    return prepare_talker(tmp_path_factory.mktemp("emotional") / "corpus", options, workers=1)
+
+
 @pytest.mark.parametrize("family", FAMILIES)
-def test_eight_devices_train_as_one(tmp_path, toy_corpus, family):
+def test_eight_devices_train_as_one(tmp_path, emotional_corpus, family):
     settings = settings_of(family)
-    end(begin(tmp_path / "one", toy_corpus, settings))
-    end(begin(tmp_path / "eight", toy_corpus, settings, devices=8))
+    end(begin(tmp_path / "one", emotional_corpus, settings))
+    end(begin(tmp_path / "eight", emotional_corpus, settings, devices=8))
     np.testing.assert_allclose(losses(tmp_path / "eight"), losses(tmp_path / "one"), rtol=TOLERANCE)
 
 
