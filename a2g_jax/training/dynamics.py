@@ -55,7 +55,8 @@ def recorded_fps(corpus: Corpus, segments: Sequence[Segment]) -> float | None:
     """Lowest frame rate of the recordings of segments before they were prepared; None where a corpus of an earlier
     version does not have one of them."""
     rates = [corpus.annotations(number).get("motion_fps") for number in {one.recording for one in segments}]
-    return None if None in rates else float(min(rates))
+    known = [float(rate) for rate in rates if rate is not None]
+    return min(known) if len(known) == len(rates) else None
 
 
 def _drawing(model: Model, config: RunConfig) -> Any:

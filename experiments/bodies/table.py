@@ -14,10 +14,12 @@ def render(found: Mapping[str, Any]) -> str:
     rows = found["cases"]
     done = [row for row in rows if row["status"] == 0]
     total = sum(row["samples"] for row in done)
+    every = found.get("every", 1)
+    command = "python -m experiments.bodies" + (f" --every {every}" if every > 1 else "")
     lines = [
         "# No broken body leaves the house",
         "",
-        f"`python -m experiments.bodies`: {len(rows)} calls of `a2g generate`, {total} motions. Every motion is checked"
+        f"`{command}`: {len(rows)} calls of `a2g generate`, {total} motions. Every motion is checked"
         " against the bounds of the run's training motion; joints that are bent or turned too far are eased back, and"
         " what is still outside is drawn again, then reported. A second implementation of the bounds judged the files:"
         f" **{sum(row['unreported'] for row in done)} frames outside the bounds were not reported.**",

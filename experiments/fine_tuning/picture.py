@@ -36,7 +36,7 @@ def draw(path: Path, records: Sequence[Record]) -> None:
         axis.axvline(1.0, color="#1d2530", linewidth=1.2)
         for shift, (method, colour) in enumerate(_SHOWN.items()):
             rows = [record["pooled"] for record in own if record["method"] == method]
-            for number, name in enumerate(names):
+            for number, name in enumerate(names if rows else ()):
                 ratios = np.array([row[name] / person[name] for row in rows])
                 y = number + 0.22 * (shift - 1)
                 axis.plot([ratios.min(), ratios.max()], [y, y], color=colour, linewidth=2.0, alpha=0.6)
@@ -50,7 +50,7 @@ def draw(path: Path, records: Sequence[Record]) -> None:
         axis.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
         axis.spines[["top", "right"]].set_visible(False)
     axes[0][0].invert_yaxis()
-    axes[0][-1].legend(frameon=False, fontsize=9, loc="upper right")
+    axes[0][0].legend(frameon=False, fontsize=9, loc="upper right")
     figure.tight_layout()
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png", dpi=110)

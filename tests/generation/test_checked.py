@@ -29,7 +29,7 @@ def run(toy_run_config, toy_corpus):
     return Run(replace(toy_run_config(), body_extremes=corpus_extremes(toy_corpus, toy_run_config())), {}, {}, 0)
 
 
-def broken(motion, frame=60, joint="L_Elbow"):
+def broken(motion, frame=60, joint="L_Knee"):
     rotations = np.array(motion.rotations)
     rotations[frame, motion.skeleton.names.index(joint)] = np.diag([-1.0, 1.0, -1.0])
     return replace(motion, rotations=rotations)
@@ -84,7 +84,7 @@ def test_a_bad_sample_is_drawn_again(run):
     assert sampler.reports == [(7, 0), (redrawn_seed(7, 1, 2), 0), (7, 2), (7, 3)]
     assert [report.draws for report in checked.reports] == [1, 3, 1, 1]
     assert all(check_motion(motion, checked.bounds) == () for motion in motions)
-    assert "sample 1: good after 3 draws; before: 2.00 s (frame 60): L_Elbow" in checked.lines()[1]
+    assert "sample 1: good after 3 draws; before: 2.00 s (frame 60): L_Knee" in checked.lines()[1]
     alone = list(Checked(run, Scripted(bad)).stream(SPEECH, 2, 7))
     for one, other in zip(alone, motions, strict=False):
         np.testing.assert_array_equal(one.root, other.root)
@@ -119,8 +119,8 @@ def test_a_sample_that_stays_bad_is_reported(run, tmp_path):
     assert [row["draws"] for row in written["samples"]] == [1, 1 + REDRAWS]
     assert written["samples"][0]["findings"] == []
     worst = written["samples"][1]["findings"][0]
-    assert (worst["joint"], worst["first"]) == ("L_Elbow", 60)
-    assert worst["value"] > worst["bound"] == written["bounds"][worst["figure"]]["L_Elbow"]
+    assert (worst["joint"], worst["first"]) == ("L_Knee", 60)
+    assert worst["value"] > worst["bound"] == written["bounds"][worst["figure"]]["L_Knee"]
     assert "sample 1: OUTSIDE THE BOUNDS OF A BODY after 4 draws" in "".join(checked.lines())
     assert "outside the bounds of a body at 2.0" in (tmp_path / "index.html").read_text()
 
@@ -129,7 +129,7 @@ def test_strict_leaves_nothing(run, tmp_path):
     """The error names sample, time, joint and figure; files of an earlier call stay."""
     sampler = Scripted(lambda seed, sample: sample == 1 or seed != 7)
     (tmp_path / "sample_00.npz").write_bytes(b"earlier")
-    with pytest.raises(InputError, match=r"sample 1: .* after 4 draws: 2\.0\d s \(frame 6\d\): L_Elbow .* --strict"):
+    with pytest.raises(InputError, match=r"sample 1: .* after 4 draws: 2\.0\d s \(frame 6\d\): L_Knee .* --strict"):
         export(run, Checked(run, sampler, strict=True), SPEECH, tmp_path, samples=3, seed=7, formats=("npz",), title="")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"sample_00.npz": b"earlier"}
     good = Checked(run, Scripted(lambda seed, sample: False), strict=True)
@@ -245,5 +245,5 @@ def test_the_command_line(tmp_path, capsys, monkeypatch):
     assert main([*command, "--out", str(tmp_path / "bad")]) == 0
     assert "sample 0: OUTSIDE THE BOUNDS OF A BODY after 4 draws: 2.0" in capsys.readouterr().out
     assert main([*command, "--out", str(tmp_path / "worse"), "--strict"]) == 2
-    assert "L_Elbow" in capsys.readouterr().err
+    assert "L_Knee" in capsys.readouterr().err
     assert not (tmp_path / "worse").exists()

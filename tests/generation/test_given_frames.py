@@ -18,7 +18,8 @@ from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.run import Run, demo_run
 
 SPEECH = talk(6.0, 21)
-ELBOW = SPEECH.motion.skeleton.names.index("L_Elbow")
+#: An elbow that flips would be bridged; legs are not eased.
+ELBOW, KNEE = (SPEECH.motion.skeleton.names.index(name) for name in ("L_Elbow", "L_Knee"))
 
 
 @pytest.fixture(scope="module")
@@ -26,11 +27,11 @@ def run(toy_run_config, toy_corpus):
     return Run(replace(toy_run_config(), body_extremes=corpus_extremes(toy_corpus, toy_run_config())), {}, {}, 0)
 
 
-def turned(motion, degrees):
-    """The motion with its left elbow turned about the vertical at every frame by an angle of that frame."""
+def turned(motion, degrees, joint=ELBOW):
+    """The motion with a joint turned about the vertical at every frame by an angle of that frame."""
     rotations = np.array(motion.rotations)
     turn = Rotation.from_rotvec(np.radians(degrees)[:, None] * [0.0, 1.0, 0.0]).as_matrix()
-    rotations[:, ELBOW] = turn @ rotations[:, ELBOW]
+    rotations[:, joint] = turn @ rotations[:, joint]
     return replace(motion, rotations=rotations.astype(np.float32))
 
 
@@ -60,7 +61,7 @@ def test_the_remedy_is_one_that_helps(run):
     """Another seed changes no pinned clip; it may change what is around one."""
     flip = np.zeros(SPEECH.motion.frames)
     flip[60] = 180.0
-    bad, bounds = turned(SPEECH.motion, flip), run.config.body_bounds
+    bad, bounds = turned(SPEECH.motion, flip, KNEE), run.config.body_bounds
     pinned = error(run, Given(bad, (Stretch(55, 70, bounds),), remedy="pin another clip"))
     assert pinned.endswith("; pin another clip, or leave --strict out.")
     around = error(run, Given(bad, (Stretch(70, 90, bounds),), ((55, 70),), remedy="pin another clip"))
@@ -72,7 +73,7 @@ def test_the_remedy_is_one_that_helps(run):
 def test_frames_that_are_not_fixed_are_drawn_again(run):
     flip = np.zeros(SPEECH.motion.frames)
     flip[60] = 180.0
-    bad, bounds = turned(SPEECH.motion, flip), run.config.body_bounds
+    bad, bounds = turned(SPEECH.motion, flip, KNEE), run.config.body_bounds
     for fixed, draws in ((True, 1), (False, 1 + REDRAWS)):
         sampler = Given(bad, (Stretch(55, 70, bounds, fixed),))
         list(Checked(run, sampler).stream(SPEECH.audio, 1))
