@@ -35,7 +35,7 @@ class Delivery:
 
     character: "Character | None" = None
     """The rig to write for; None for the run's skeleton."""
-    fps: float | None = None
+    fps: float | int | None = None
     """Frames per second; None for the run's."""
     fingers: bool = True
     """Whether fingers of the character that nothing moves are relaxed; else they stay as in its rest pose."""
