@@ -58,7 +58,7 @@ class Delivery:
     def make(self, motion: Motion) -> Made:
         """A generated motion as it is written."""
         if self.fps is not None:
-            motion = resample(motion, self.fps)
+            motion = resample(motion, float(self.fps))
         if self.character is None:
             return Made(facing(motion, self.direction))
         own = retarget(motion, self._matched(motion.skeleton))
