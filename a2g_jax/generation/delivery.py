@@ -35,7 +35,7 @@ class Delivery:
 
     character: "Character | None" = None
     """The rig to write for; None for the run's skeleton."""
-    fps: float | None = None
+    fps: float | int | None = None
     """Frames per second; None for the run's."""
     fingers: bool = True
     """Whether fingers of the character that nothing moves are relaxed; else they stay as in its rest pose."""
@@ -58,7 +58,7 @@ class Delivery:
     def make(self, motion: Motion) -> Made:
         """A generated motion as it is written."""
         if self.fps is not None:
-            motion = resample(motion, self.fps)
+            motion = resample(motion, float(self.fps))
         if self.character is None:
             return Made(facing(motion, self.direction))
         own = retarget(motion, self._matched(motion.skeleton))
