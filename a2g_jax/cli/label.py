@@ -5,7 +5,7 @@ from pathlib import Path
 
 from a2g_jax.cli.argument_types import count, natural
 from a2g_jax.cli.paths import existing_file, existing_folder, existing_run, writable_file
-from a2g_jax.cli.prepare import reader_name
+from a2g_jax.cli.prepare_flags import reader_name
 from a2g_jax.errors import InputError
 
 DESCRIPTION = "Label recordings with emotions by a classifier of audio. Interruptible: the same command resumes."
