@@ -178,6 +178,7 @@ def test_hidden_choices_found_in_what_tells_and_not_in_noise():
         assert hidden.compare([sure], [takes_of])["p"] == pytest.approx(1 / 6)
 
 
+@pytest.mark.slow
 def test_hidden_runs_on_small_recordings():
     roles = [{**ROLE, "seed": seed, "name": f"{seed:04d}"} for seed in range(3)]
     result = common.rounded(_with_roles(hidden, roles, Namespace(takes=1, permutations=1, seed=0, workers=1)))
@@ -352,6 +353,7 @@ def test_bounds_of_small_recordings():
     assert still(motion, motion, "l1") == 0.0
 
 
+@pytest.mark.slow
 def test_cost_of_a_small_corpus():
     figures = cost.corpus("corpus-1", 0.4, 0, 1)
     assert figures["median_s"] > 0

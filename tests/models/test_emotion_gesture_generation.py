@@ -184,7 +184,9 @@ def test_a_motion_without_seed_poses_begins_in_one_of_the_calm_poses(audio):
         rows(run, audio[:40], seed_poses=seeds[:3])
 
 
-@pytest.mark.parametrize("timeline", ["anger", "neutral@0,anger@12.5,happiness@15"])
+@pytest.mark.parametrize(
+    "timeline", [pytest.param("anger", marks=pytest.mark.slow), "neutral@0,anger@12.5,happiness@15"]
+)
 def test_the_control_is_the_setting(audio, timeline):
     """Of equal seeds, as lines of the settings and as an array of the caller."""
     by_setting = rows(make_run(EmotionGestureSampling(emotion=timeline)), audio)

@@ -226,7 +226,7 @@ class TestPriors:
         # |z|^2 / C is F-distributed.
         assert stats.kstest(np.sum(np.square(z), axis=-1) / 3, stats.f(3, 5).cdf).pvalue > 0.01
 
-    @pytest.mark.parametrize("freedom", [0.0, 50.0])
+    @pytest.mark.parametrize("freedom", [0.0, pytest.param(50.0, marks=pytest.mark.slow)])
     def test_the_density_of_a_flow_integrates_to_one(self, double, freedom):
         shape = shape_of(channels=2)
         _, history, condition = as_double(clips(shape, count=1, frames=1))
