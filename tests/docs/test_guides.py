@@ -23,7 +23,22 @@ CALLS = [one for one in SHELL if one.words[:1] == ["a2g"] or one.words[:1] == ["
 INLINE = [one for page in PAGES for one in inline_commands(page)]
 PYTHON = [one for page in PAGES for one in programs(page)]
 #: Other programs that the guides call.
-PROGRAMS = {"a2g", "python", "python3", "pip", "export", "ruff", "mypy", "mkdocs", "jupyter", "blender", "cp", "srun", "tensorboard", "."}
+PROGRAMS = {
+    "a2g",
+    "python",
+    "python3",
+    "pip",
+    "export",
+    "ruff",
+    "mypy",
+    "mkdocs",
+    "jupyter",
+    "blender",
+    "cp",
+    "srun",
+    "tensorboard",
+    ".",
+}
 #: Runs and models that the guides name, by the model whose settings they have.
 MODELS = {"demo": "audio2gestures", "demo-flow": "stylized_flow", "demo-emotion": "emotion_gesture"}
 
