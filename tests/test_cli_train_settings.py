@@ -84,6 +84,10 @@ def test_a_file_that_is_not_there(tmp_path, capsys):
     assert "there.toml" in fails(capsys, "train", "audio2gestures", "--settings", "--config", tmp_path / "there.toml")
 
 
+def test_a_file_may_begin_with_a_mark(tmp_path):
+    assert read_settings(str(written(tmp_path, "\ufeff[training]\nsteps = 7\n"))).values == {"training": {"steps": 7}}
+
+
 @pytest.mark.parametrize("text", ["", "0,0", "0,a", "-1"])
 def test_seeds_that_are_none(text, capsys):
     with pytest.raises(SystemExit):

@@ -110,7 +110,7 @@ class Ready:
     about: dict[str, Any] = field(default_factory=dict)
     """Further arguments of :func:`~a2g_jax.generation.export.export`: label, words and lanes."""
     lines: tuple[str, ...] = ()
-    """What is known before the work, for the user."""
+    """Remarks before the work, for the user."""
 
     def report(self, out: Path) -> list[str]:
         """Write reports to the output folder after the motions; the lines to print."""

@@ -72,7 +72,7 @@ def read_settings(path: str) -> SettingsFile:
     """
     file = check_readable(path, "a TOML file")
     try:
-        text = file.read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8-sig")  # editors on Windows begin files with a mark
         values = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: is no TOML ({error}); see 'a2g train MODEL --settings --toml'.") from None

@@ -66,8 +66,7 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     from a2g_jax.serving.studio.routes import studio_app
 
     keep_compilations()
-    first = next(iter(systems)) if not options.runs else list(systems)[len(SHIPPED)]
-    with make_studio(systems, first) as studio:
+    with make_studio(systems, first_run(options.runs)) as studio:
         add_demo_speech(studio)
         app = studio_app(studio, options.host, tuple(options.allow_host), begin=lambda: _open_first(studio))
         serve(app, bound, announce=lambda line: _announce(line, browser=not options.no_browser))
@@ -84,11 +83,21 @@ def named_runs(folders: Sequence[str]) -> dict[str, str]:
         if folder in SHIPPED:
             continue
         existing_run(folder)
-        name = Path(folder).resolve().name
+        name = _page_name(folder)
         if name in found:
             raise InputError(f"{folder}: another run of the studio has the name {name!r}; rename the folder.")
         found[name] = folder
     return found
+
+
+def first_run(runs: Sequence[str]) -> str:
+    """The run that the page begins with, by what the page calls it: the first one of the command, else ``demo``."""
+    return _page_name(runs[0]) if runs else next(iter(SHIPPED))
+
+
+def _page_name(run: str) -> str:
+    """What the page calls a run."""
+    return run if run in SHIPPED else Path(run).resolve().name
 
 
 def make_studio(systems: dict[str, str], first: str) -> "Studio":

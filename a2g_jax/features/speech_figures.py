@@ -26,6 +26,8 @@ _GROUPS = 16
 _PITCH_LOW, _PITCH_HIGH = 60.0, 700.0
 #: Seconds from one frame to the next, and least autocorrelation of a voiced one.
 _HOP, _VOICED = 0.02, 0.6
+#: Frames whose pitch is computed at a time.
+_PIECE = 4096
 
 
 class Spectra(NamedTuple):
@@ -94,22 +96,10 @@ def window_pitch(audio: Float[np.ndarray, " N"], sample_rate: int) -> Float[np.n
     audio = signal.decimate(audio, factor, ftype="fir") if factor > 1 else audio
     size, hop = round(0.05 * rate), round(_HOP * rate)
     frames = np.lib.stride_tricks.sliding_window_view(audio, size)[::hop]
-    window = np.hanning(size)
-    length = 1 << (2 * size - 1).bit_length()
-    frames = (frames - frames.mean(axis=1, keepdims=True)) * window
-    correlation = np.fft.irfft(np.abs(np.fft.rfft(frames, length, axis=1)) ** 2, axis=1)[:, :size]
-    own = np.fft.irfft(np.abs(np.fft.rfft(window, length)) ** 2)[:size]
-    power = correlation[:, 0]
-    first, last = int(rate / _PITCH_HIGH), min(int(rate / _PITCH_LOW), size - 1)
-    normal = correlation[:, : last + 2] / np.maximum(power[:, None], 1e-12) / (own[: last + 2] / own[0])
-    lags = np.arange(first, last + 1)
-    inner = normal[:, first : last + 1]
-    peak = (inner >= normal[:, first - 1 : last]) & (inner >= normal[:, first + 1 : last + 2])
-    strength = np.where(peak, inner - 0.02 * np.log2(lags / first), -1.0)
-    best = strength.argmax(axis=1)
-    loud = float(np.percentile(power, 95))
-    voiced = (inner[np.arange(len(inner)), best] > _VOICED) & peak.any(axis=1) & (power > 10 ** (-_PAUSE / 10) * loud)
-    pitch = rate / lags[best]
+    # In pieces, since a frame's spectrum takes ten times the memory of its samples.
+    pieces = [_frame_pitch(frames[start : start + _PIECE], rate) for start in range(0, len(frames), _PIECE)]
+    pitch, height, power = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    voiced = (height > _VOICED) & (power > 10 ** (-_PAUSE / 10) * float(np.percentile(power, 95)))
     per_window, step = min(round(WINDOW / _HOP), len(pitch)), round(STEP / _HOP)
     medians = []
     for start in range(0, len(pitch) - per_window + 1, step):
@@ -117,6 +107,24 @@ def window_pitch(audio: Float[np.ndarray, " N"], sample_rate: int) -> Float[np.n
         if len(chosen) >= 0.1 * per_window:
             medians.append(float(np.median(chosen)))
     return np.asarray(medians)
+
+
+def _frame_pitch(frames: Float[np.ndarray, "F size"], rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pitch of each frame, Hz, its autocorrelation there, -1 without any peak, and the power of the frame."""
+    size = frames.shape[1]
+    window, length = np.hanning(size), 1 << (2 * size - 1).bit_length()
+    frames = (frames - frames.mean(axis=1, keepdims=True)) * window
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(frames, length, axis=1)) ** 2, axis=1)[:, :size]
+    own = np.fft.irfft(np.abs(np.fft.rfft(window, length)) ** 2)[:size]
+    power = correlation[:, 0].copy()
+    first, last = int(rate / _PITCH_HIGH), min(int(rate / _PITCH_LOW), size - 1)
+    normal = correlation[:, : last + 2] / np.maximum(power[:, None], 1e-12) / (own[: last + 2] / own[0])
+    lags = np.arange(first, last + 1)
+    inner = normal[:, first : last + 1]
+    peak = (inner >= normal[:, first - 1 : last]) & (inner >= normal[:, first + 1 : last + 2])
+    best = np.where(peak, inner - 0.02 * np.log2(lags / first), -1.0).argmax(axis=1)
+    height = np.where(peak.any(axis=1), inner[np.arange(len(inner)), best], -1.0)
+    return rate / lags[best], height, power
 
 
 def _level(spectra: Float[np.ndarray, "T bands"]) -> Float[np.ndarray, " T"]:

@@ -60,7 +60,7 @@ class Generator:
         self._changed: dict[Any, Generator] = {}
 
     def with_sampling(self, **sampling: Any) -> "Generator":
-        """The generator with other sampling settings; asked again for the same, it is the same, and compiled already.
+        """The generator with other sampling settings; calls with equal ones return the same, compiled already.
 
         Args:
             sampling: settings of the model, such as ``noise_scale=0.7`` or ``temperature=0.8``.

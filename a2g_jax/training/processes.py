@@ -78,13 +78,15 @@ def joined_processes() -> Iterator[None]:
     the others end with :class:`LostProcess`, one line and status 2, whatever they are waiting for.
 
     Raises:
-        InputError: environment variables that do not fit.
+        InputError: environment variables that do not fit, or Windows, where JAX has no Gloo.
         LostProcess: the others were never there, or one of them has ended.
     """
     place = find_place()
     if place is None:
         yield
         return
+    if os.name == "nt":
+        raise InputError("several processes train together on Linux and macOS alone; on Windows, use one.")
     with _Watch(place) as watch:
         _join(place)
         watch.joined()

@@ -43,6 +43,8 @@ from experiments.controls.subject import SECONDS, Ruler, Subject, column
 from experiments.controls.table import render
 from experiments.motion.speeches import SEED, Speech, Talk, held_out_talk
 
+#: Kinds of intervals, of figures that are measured now and of those without an entry.
+INTERVALS, OLD_INTERVALS = "Student's t", "the percentile bootstrap"
 #: The control with a gain that is chosen on other speeches, with ``--talk-seed`` and ``--emotion-gain``.
 EMOTION = "emotion"
 #: Largest gain: beyond it, all requests but those near the median would be for the extreme clips.
@@ -89,6 +91,8 @@ def main() -> None:
             found = before or responses(subject, _spread(run, speeches), lambda: bar.update(1))
             if judge is not None and emotions:
                 found["emotions"] = confusion(subject, judge, emotions, lambda: bar.update(1))
+        # Kept figures keep their kind of interval.
+        intervals = INTERVALS if before is None else before["about"].get("intervals", OLD_INTERVALS)
         found["about"] = {
             "command": " ".join(["python -m experiments.controls", _named(name), *_given(options)]),
             "speeches": len(speeches),
@@ -96,7 +100,8 @@ def main() -> None:
             "seconds": SECONDS,
             "draws": options.draws,
             "seed": options.seed,
-            "intervals": "Student's t",
+            "intervals": intervals,
+            **({"emotion_intervals": INTERVALS} if "emotions" in found else {}),
             "gains": list(getattr(run.config.sampling_settings, "control_gains", ())),
             "judge": judge.fingerprint if judge is not None and emotions else None,
         }

@@ -21,7 +21,7 @@ def render(figures: dict[str, Any]) -> str:
             "",
             f"`{about['command']}`: {about['speeches']} held-out speeches (seed {about['talk_seed']}) of"
             f" {about['seconds']:g} s, {about['draws']} motions each, seeds from {about['seed']} on; intervals by"
-            f" {about.get('intervals', 'the percentile bootstrap')}; gains"
+            f" {about.get('intervals', 'the percentile bootstrap')}{_of_emotions(about)}; gains"
             f" {', '.join(about['gains']) or 'none'}.",
             "",
             *([*_slopes(run), "", *_side_effects(run), ""] if run["controls"] else []),
@@ -29,6 +29,12 @@ def render(figures: dict[str, Any]) -> str:
     if "true_emotions" in figures:
         lines += ["## Emotions", "", *_emotions(figures)]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _of_emotions(about: dict[str, Any]) -> str:
+    """The kind of the intervals of emotions, where it is another one."""
+    kind = about.get("emotion_intervals")
+    return f", of emotions by {kind}" if kind not in (None, about.get("intervals")) else ""
 
 
 def _slopes(run: dict[str, Any]) -> list[str]:

@@ -161,5 +161,5 @@ RUN = [one for page in PAGES for one in programs(page) if not any(part in one.te
 def test_programs_run(one, here):
     names = {"__name__": "guide"}
     if one.page == "docs/style.md":
-        pytest.skip("goes on from motions of one's own; tests/generation/test_style.py runs it")
+        pytest.skip("continues with motions of one's own; tests/generation/test_style.py runs it")
     exec(compile(one.text, str(one), "exec"), names)

@@ -104,6 +104,13 @@ def test_pitch_of_a_glottal_wave(hertz):
     assert window_pitch(pulses, RATE) == pytest.approx(hertz, rel=0.03)
 
 
+def test_pitch_does_not_depend_on_the_pieces(monkeypatch):
+    speech = demo_speech().audio
+    whole = window_pitch(speech, RATE)
+    monkeypatch.setattr("a2g_jax.features.speech_figures._PIECE", 100)
+    np.testing.assert_array_equal(window_pitch(speech, RATE), whole)
+
+
 def test_rate_counts_bursts_and_level_their_depth():
     voice = signal.lfilter([1], [1, -0.9], np.random.default_rng(0).normal(size=len(TIME)))
     slow = voice * (0.02 + (np.sin(2 * np.pi * 2 * TIME) > 0))

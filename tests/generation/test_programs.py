@@ -12,7 +12,9 @@ from a2g_jax.errors import InputError
 from a2g_jax.generation.engine import Engine
 from a2g_jax.generation.generator import Generator
 from a2g_jax.generation.programs.loaded import Programs
+from a2g_jax.generation.programs.manifest import Manifest
 from a2g_jax.generation.programs.writing import export_programs
+from a2g_jax.io.sealed import read_sealed, write_sealed
 from a2g_jax.models.base import Condition
 from a2g_jax.training.run import open_run
 
@@ -106,6 +108,15 @@ def test_inputs_that_do_not_fit_are_named(folder: Path):
         next(programs.rows(features(64, 20), 1, emotion=np.zeros((20, 8))))
     with pytest.raises(InputError, match="less than a frame"):
         next(programs.generate(np.zeros(100, np.float32), 1))
+
+
+@pytest.mark.parametrize("name", ["../window.stablehlo", "begin.stablehlo"])
+def test_a_manifest_with_other_files_is_refused(name: str, folder: Path, tmp_path: Path):
+    values = read_sealed(folder / "manifest.json")
+    values["programs"][name] = values["programs"]["window.stablehlo"]
+    write_sealed(tmp_path / "manifest.json", values)
+    with pytest.raises(InputError, match="manifest.json: is damaged"):
+        Manifest.read(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["window.stablehlo", "weights.safetensors", "manifest.json"])

@@ -124,9 +124,10 @@ def test_samples_are_generated_shown_and_downloaded(client, studio, recording):
 def test_the_archive_has_all_samples_and_the_ranking(client, studio):
     take = generate(client, studio)
     assert client.post(f"/api/takes/{take}/stars", json={"sample": 1, "stars": 4}).status_code == 204
-    archive = zipfile.ZipFile(io.BytesIO(client.get(f"/api/takes/{take}/all.zip?formats=bvh,npz,mp4").content))
+    archive = zipfile.ZipFile(io.BytesIO(client.get(f"/api/takes/{take}/all.zip?formats=bvh,npz,mp4,bvh").content))
     names = archive.namelist()
     assert names[:3] == ["speech.wav", "take1_sample1.bvh", "take1_sample1.npz"]
+    assert len(names) == len(set(names))
     assert {"take1_sample0.bvh", "take1_sample0.npz", "take.json"} <= set(names)
     about = json.loads(archive.read("take.json"))
     assert about["stars"] == {"1": 4}
@@ -252,6 +253,13 @@ def test_the_oldest_takes_without_stars_make_room(client, studio):
     assert len(list(studio.folder.glob("take-*"))) == 3
     assert client.delete(f"/api/takes/{takes[0]}").status_code == 204
     assert len(list(studio.folder.glob("take-*"))) == 2
+
+
+def test_a_request_that_is_refused_removes_no_take(client, studio, monkeypatch):
+    kept = [generate(client, studio, seed=seed) for seed in range(3)]
+    monkeypatch.setattr(studio.jobs, "_waiting", 0)
+    assert client.post("/api/takes", json=wanted()).status_code == 400
+    assert list(studio.takes) == kept
 
 
 def test_samples_of_different_speeches_are_not_played_together(client, studio, recording):

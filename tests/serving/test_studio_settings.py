@@ -2,7 +2,7 @@
 
 import pytest
 
-from a2g_jax.cli.studio import _parser, generate_take, named_runs
+from a2g_jax.cli.studio import _parser, first_run, generate_take, named_runs
 from a2g_jax.errors import InputError
 from a2g_jax.generation.capabilities import capabilities
 from a2g_jax.serving.studio.jobs import Job
@@ -177,6 +177,11 @@ def test_runs_of_one_name_are_refused(tmp_path):
     for folder in ("a/run", "b/run", "demo"):
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "run.json").write_text("{}")
+    assert [first_run(runs) for runs in ([], ["demo-flow"], [str(tmp_path / "a/run"), "demo"])] == [
+        "demo",
+        "demo-flow",
+        "run",
+    ]
     assert list(named_runs([str(tmp_path / "a/run"), "demo"])) == ["demo", "demo-flow", "demo-emotion", "run"]
     for folders in ([tmp_path / "a/run", tmp_path / "b/run"], [tmp_path / "demo"]):
         with pytest.raises(InputError, match="rename the folder"):

@@ -50,7 +50,7 @@ class Manifest:
 
     model: str
     run: dict[str, Any]
-    """Preset, steps and hash of the weights of the run."""
+    """Preset and steps of the run."""
     fps: float
     mel: MelConfig
     space: PoseSpace
@@ -91,6 +91,7 @@ class Manifest:
         if values.get("version") != VERSION:
             raise InputError(f"{path}: has version {values.get('version')}; this package reads version {VERSION}.")
         try:
+            _check_names(values["programs"], values["files"])
             return cls(
                 model=str(values["model"]),
                 run=dict(values["run"]),
@@ -121,6 +122,12 @@ class Manifest:
                 raise InputError(f"{path}: is missing; export the run again.")
             if sha256_file(path) != digest:
                 raise InputError(f"{path}: differs from the file that was exported; export the run again.")
+
+
+def _check_names(programs: dict[str, Any], files: dict[str, Any]) -> None:
+    """Refuse other files than those of an export: names come from a file, and lead nowhere else."""
+    if WINDOW not in programs or not set(programs) <= {BEGIN, WINDOW} or set(files) != {*programs, WEIGHTS}:
+        raise ValueError("files")
 
 
 def _ports(values: dict[str, Any]) -> Ports:

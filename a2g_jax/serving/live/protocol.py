@@ -4,7 +4,6 @@ Nothing here waits or computes motion. What a client can get wrong is a :class:`
 """
 
 import json
-import math
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -208,7 +207,8 @@ def _typed(name: str, value: Any, default: Any) -> Any:
             return tuple(value)
         raise Refusal(MALFORMED, f"sampling: {name}: expected a list of texts.")
     kinds: tuple[type, ...] = {bool: (bool,), str: (str,), float: (int, float)}.get(type(default), (int,))
-    if type(value) not in kinds or (isinstance(value, float) and not math.isfinite(value)):
+    # NaN is not below anything; whole numbers beyond 32 bits fit no array.
+    if type(value) not in kinds or not (isinstance(value, str) or abs(value) < 2**31):
         raise Refusal(MALFORMED, f"sampling: {name}: expected {' or '.join(kind.__name__ for kind in kinds)}.")
     return float(value) if isinstance(default, float) else value
 

@@ -34,7 +34,7 @@ class Limits:
     burst: float = 10.0
     """Seconds of audio that are read without waiting."""
     programs: int = 4
-    """Different sampling settings and look-aheads whose programs are kept."""
+    """Different sampling settings and look-aheads whose programs are kept, besides the server's own."""
     threads: int = 2
     """Threads that compute."""
 
@@ -64,7 +64,8 @@ class Service:
         self._compiling = asyncio.Lock()
         self.default = Stream(run, lookahead=lookahead)
         frames = None if lookahead is None else round(lookahead * self.default.fps)
-        self._programs: OrderedDict[str, Stream] = OrderedDict({json.dumps([frames, []]): self.default})
+        self._own = json.dumps([frames, []])
+        self._programs: OrderedDict[str, Stream] = OrderedDict()
         delivery.match(run.config.skeleton)
 
     def warm_up(self) -> None:
@@ -85,6 +86,8 @@ class Service:
         lookahead = self.lookahead if hello.lookahead is None else hello.lookahead
         frames = None if lookahead is None else round(lookahead * self.run.config.fps)
         key = json.dumps([frames, sorted(changes.items())])
+        if key == self._own:  # never dropped, and does not wait for what other clients compile
+            return await self.compute(self.default.restarted, hello.seed, hello.sample_rate)
         # One at a time: compiling takes all cores for seconds. Others go on meanwhile, in their own threads.
         async with self._compiling:
             if key not in self._programs:

@@ -172,7 +172,8 @@ class _Api:
 
     async def zip(self, request: Request) -> Response:
         take = self.studio.find(request.path_params["take"])
-        chosen = [name for name in request.query_params.get("formats", "bvh,npz").split(",") if name]
+        names = request.query_params.get("formats", "bvh,npz").split(",")
+        chosen = list(dict.fromkeys(name for name in names if name))  # each once, however often it is named
         folder = tempfile.mkdtemp(prefix="zip-", dir=self.studio.folder)
         path = Path(folder) / "samples.zip"
         try:

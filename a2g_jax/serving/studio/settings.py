@@ -43,7 +43,7 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,40}")
 
 @dataclass(frozen=True)
 class Request:
-    """What the page asked for."""
+    """A request of the page, checked."""
 
     system: str
     speech: Upload

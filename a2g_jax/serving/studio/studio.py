@@ -165,8 +165,8 @@ class Studio:
         )
         job.total, job.unit = request.samples, "sample"
         take = Take(self._made + 1, request, folder, job, self._words.get(request.speech.id, ()), values)
+        self.jobs.submit(job)  # first: one that is refused removes no other take
         self._make_room()
-        self.jobs.submit(job)
         self._made += 1
         self.takes[take.id] = take
         self._changes += 1

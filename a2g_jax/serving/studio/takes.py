@@ -157,8 +157,10 @@ class Take:
     def write_zip(self, path: Path, chosen: Sequence[str]) -> None:
         """All samples in some formats, the speech and the ranking as one archive, the samples with most stars first.
 
+        Files in a slow format that are not there yet are left out.
+
         Raises:
-            InputError: no such format, or one that is slow to write and not there yet.
+            InputError: no such format.
             OutputError: the disk is full.
         """
         with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -173,7 +175,7 @@ class Take:
                 archive.write(report, report.name)
 
     def summary(self) -> dict[str, Any]:
-        """What the archive tells about the take."""
+        """Command, ranking and scores, for the archive."""
         return {
             "command": self.request.command,
             "stars": {str(sample): stars for sample, stars in sorted(self.stars.items())},

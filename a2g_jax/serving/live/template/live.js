@@ -100,7 +100,7 @@ class Live {
       if (this.sent - this.frames / this.figure.fps > this.latency + BACKLOG) { this.stop("The server is too slow for this: choose a run that computes less, or close other programs.", true); return; }
       this.socket.send(data);
       this.sent += data.length / rate;
-      this.heard = performance.now();
+      this.arrived = performance.now();
       const power = data.reduce((sum, x) => sum + x * x, 0) / data.length / 32768 ** 2;
       this.loudness = clamp(1 + Math.log10(power + 1e-9) / 5, 0, 1);
     };
@@ -131,7 +131,7 @@ class Live {
     if (this.frames) {
       this.stage.time = this.playhead.advance(elapsed, this.figure.newest);
       // Since its last piece, the microphone has gone on.
-      const now = this.sent + Math.min((performance.now() - this.heard) / 1000, 0.5), behind = now - this.stage.time;
+      const now = this.sent + Math.min((performance.now() - this.arrived) / 1000, 0.5), behind = now - this.stage.time;
       this.behind = this.behind ? mix(this.behind, behind, 0.05) : behind;
       this.delay.delayTime.setTargetAtTime(clamp(this.behind, 0, 20), this.context.currentTime, 1);
       this.write("behind", seconds(this.behind));

@@ -1,6 +1,6 @@
 // A microphone as a WAV file, and any sound that the browser can decode as one.
 
-export const LONGEST = 600; // seconds
+export const LONGEST = 595; // seconds; the server takes 600, and the last block comes after the end
 
 export class Recorder {
   // `onLevel` gets the loudest sample of each block and the seconds so far.
@@ -18,7 +18,10 @@ export class Recorder {
     recorder.context = new AudioContext();
     recorder.blocks = [];
     recorder.count = 0;
-    await recorder.context.audioWorklet.addModule("capture.js");
+    try { await recorder.context.audioWorklet.addModule("capture.js"); } catch (error) {
+      for (const track of stream.getTracks()) track.stop();
+      throw error;
+    }
     const node = new AudioWorkletNode(recorder.context, "capture", { numberOfOutputs: 0 });
     node.port.onmessage = ({ data }) => {
       recorder.blocks.push(data);

@@ -4,7 +4,7 @@ import { Refused, upload } from "./api.js";
 import { clearErrors, clock, drawWave, find, make, showError, tell } from "./dom.js";
 import { LONGEST, Recorder, decoded } from "./recorder.js";
 
-let demo = null, recorder = null, sound = null, chosen = null, changed = () => {};
+let demo = null, recorder = null, waiting = false, sound = null, chosen = null, changed = () => {};
 
 export const speech = () => chosen;
 
@@ -63,6 +63,8 @@ async function sent(file, name, progress) {
 }
 
 async function record() {
+  if (waiting) return; // for the microphone: a second one would never be stopped
+  waiting = true;
   clearErrors(document.querySelector('[data-field="speech"]'));
   try {
     recorder = await Recorder.start((peak, seconds) => {
@@ -70,7 +72,7 @@ async function record() {
       find("recorded").textContent = clock(seconds);
       if (seconds >= LONGEST && recorder) stop();
     });
-  } catch (error) { showError("speech", error.message); return; }
+  } catch (error) { showError("speech", error.message); return; } finally { waiting = false; }
   showRecording(true);
 }
 

@@ -17,7 +17,7 @@ export function beginTakes(facts, onReuse) {
   onShown(() => draw(true));
 }
 
-// A take that this page asked for is shown once it is done.
+// A take that this page requested is shown once it is done.
 export function expect(take) {
   mine.add(take.id);
   update({ takes: [take, ...takes.filter((other) => other.id !== take.id)] });
