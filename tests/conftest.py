@@ -106,22 +106,6 @@ def toy_corpus(tmp_path_factory):
     return Corpus.open(path)
 
 
-#: Settings that make Audio2Gestures train in a second a hundred steps.
-TOY_MODEL = {
-    "audio_channels": (8, 8),
-    "motion_channels": (8, 8),
-    "decoder_channels": (8, 8),
-    "head_channels": 8,
-    "code_channels": 4,
-    "clip_frames": 16,
-    "specific_frames": 1,
-    "specific_jitter": 0,
-    "smoothing": 0,
-    "stored_codes": False,
-    "adversarial_steps": 0,
-}
-
-
 @pytest.fixture(scope="session")
 def toy_run_config(toy_corpus):
     """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings."""
@@ -130,6 +114,7 @@ def toy_run_config(toy_corpus):
     from a2g_jax.models import find_model
     from a2g_jax.models.train_config import TRAIN_PRESETS
     from a2g_jax.training.run import RunConfig
+    from tests.toy_model_for_tests import TOY_MODEL
 
     def make(**changes):
         model = dataclasses.replace(find_model("audio2gestures").presets["tiny"], **TOY_MODEL)

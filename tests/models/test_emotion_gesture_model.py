@@ -543,8 +543,8 @@ class TestEmotions:
 
     def test_a_run_takes_emotions_only_if_its_settings_say_so(self):
         fields = lambda emotion: build(CONFIG, make_data(), EmotionGestureSampling(emotion)).condition_fields  # noqa: E731
-        assert fields("audio") == fields("sample") == ("audio", "seed_poses")
-        assert fields("label") == fields("anger") == ("audio", "seed_poses", "emotion")
+        assert fields("audio") == fields("sample") == ("audio", "seed_poses", "controls")
+        assert fields("label") == fields("anger") == ("audio", "seed_poses", "emotion", "controls")
 
     def test_the_settings_request_weights(self):
         model = build(CONFIG, make_data(), EmotionGestureSampling("neutral@0,anger@1"))

@@ -96,7 +96,7 @@ class Live {
     this.frames = this.sent = 0;
     this.began = null;
     capture.port.onmessage = ({ data }) => {
-      if (this.socket.readyState !== WebSocket.OPEN) return;
+      if (this.socket?.readyState !== WebSocket.OPEN) return;
       if (this.sent - this.frames / this.figure.fps > this.latency + BACKLOG) { this.stop("The server is too slow for this: choose a run that computes less, or close other programs.", true); return; }
       this.socket.send(data);
       this.sent += data.length / rate;
