@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from a2g_jax.cli import characters, clips, sampling
 from a2g_jax.cli.argument_types import CHANNEL, channel
 from a2g_jax.cli.paths import existing_file, existing_run, writable_folder
-from a2g_jax.cli.speech import read_speech, read_words, warn_of_range
+from a2g_jax.cli.speech import range_warning, read_speech, read_words
 from a2g_jax.config import settings_lines
 from a2g_jax.errors import InputError
 
@@ -66,9 +66,12 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     writable_folder(options.out)
 
     from a2g_jax.compilations import keep_compilations
+    from a2g_jax.progress import say
 
     keep_compilations()
     ready = prepare(options, settings)
+    if ready.warning:
+        say(ready.warning)
     for line in ready.lines:
         print(line)
     sampling.write_samples(
@@ -111,6 +114,8 @@ class Ready:
     """Further arguments of :func:`~a2g_jax.generation.export.export`: label, words and lanes."""
     lines: tuple[str, ...] = ()
     """Remarks before the work, for the user."""
+    warning: str = ""
+    """A line about a speech that is unlike the training speech of the run; empty if it is not."""
 
     def report(self, out: Path) -> list[str]:
         """Write reports to the output folder after the motions; the lines to print."""
@@ -137,9 +142,9 @@ def prepare(options: argparse.Namespace, settings: Any, opened: "Run | None" = N
     lines = tuple(characters.lines(delivery, trained))
     rate = trained.config.mel.sample_rate
     audio = read_speech(options.audio, options.channel).at(rate)
-    warn_of_range(trained, options.run, audio, options.audio)
+    warning = range_warning(trained, options.run, audio, options.audio)
     words = read_words(options.transcript, options.tier, len(audio) / rate)
     chosen = clips.sampler_of(trained, audio, options)
     parts = (chosen.about.get("label", ""), sampling.changed_settings(opened.config.sampling_settings, settings))
     about = {**chosen.about, "label": ", ".join(part for part in parts if part), "words": words}
-    return Ready(trained, chosen, audio, Path(options.audio).name, delivery, about, lines)
+    return Ready(trained, chosen, audio, Path(options.audio).name, delivery, about, lines, warning)

@@ -27,8 +27,8 @@ def read_speech(path: str, channel: int | None) -> "Sound":
     return sound
 
 
-def warn_of_range(run: "Run", name: str, audio: Any, path: str) -> None:
-    """Print a line if a speech lies outside what a run was trained on.
+def range_warning(run: "Run", name: str, audio: Any, path: str) -> str:
+    """A line about a speech that lies outside what a run was trained on; empty if it does not.
 
     Args:
         name: of the run.
@@ -36,12 +36,20 @@ def warn_of_range(run: "Run", name: str, audio: Any, path: str) -> None:
         path: of the speech.
     """
     from a2g_jax.generation.unusual_speech import unusual_speech
-    from a2g_jax.progress import say
 
     found = unusual_speech(run, audio)
-    if found:
-        what = "; ".join(map(str, found))
-        say(f"warning: {path}: is outside what {name} was trained on: {what}. Its motion may fit less well.")
+    if not found:
+        return ""
+    what = "; ".join(map(str, found))
+    return f"warning: {path}: is outside what {name} was trained on: {what}. Its motion may fit less well."
+
+
+def warn_of_range(run: "Run", name: str, audio: Any, path: str) -> None:
+    """Print :func:`range_warning`, if there is one."""
+    from a2g_jax.progress import say
+
+    if line := range_warning(run, name, audio, path):
+        say(line)
 
 
 def read_words(path: str | None, tier: str | None, seconds: float) -> "tuple[Word, ...]":

@@ -188,7 +188,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         notes=tuple(note for note, _ in described),
         tracks=tuple(tracks for _, tracks in described),
         scores=_scores(folder),
-        lines=(*ready.lines, *checked.lines(), *ready.report(folder)),
+        lines=tuple(filter(None, (ready.warning, *ready.lines, *checked.lines(), *ready.report(folder)))),
     )
 
 

@@ -1,10 +1,13 @@
 """Requests of the page as arguments of a2g generate, and its errors beside the fields."""
 
+import numpy as np
 import pytest
 
 from a2g_jax.cli.studio import _parser, first_run, generate_take, named_runs
 from a2g_jax.errors import InputError
 from a2g_jax.generation.capabilities import capabilities
+from a2g_jax.io.audio import write_audio
+from a2g_jax.io.files import write_json
 from a2g_jax.serving.studio.jobs import Job
 from a2g_jax.serving.studio.readers import KINDS
 from a2g_jax.serving.studio.settings import FieldError, field_of, read_request
@@ -188,6 +191,16 @@ def test_runs_of_one_name_are_refused(tmp_path):
             named_runs([str(folder) for folder in folders])
     with pytest.raises(InputError, match="is not a run"):
         named_runs([str(tmp_path / "none")])
+
+
+def test_a_take_names_speech_unlike_the_training_speech(tmp_path, monkeypatch):
+    write_audio(tmp_path / "tone.wav", (0.3 * np.sin(2 * np.pi * 440 * np.arange(160_000) / 16_000)), 16_000)
+    write_json(tmp_path / "checks.json", {})
+    monkeypatch.setattr("a2g_jax.generation.export.export", lambda *_, **__: None)  # nothing is generated
+    take = generate_take(
+        ["demo", f"--audio={tmp_path / 'tone.wav'}", "--formats=npz"], tmp_path, Job("take 1", lambda job: None)
+    )
+    assert f"{tmp_path / 'tone.wav'}: is outside what demo was trained on: pitch 4" in take.lines[0]
 
 
 def test_the_demo_says_what_it_can_do():
