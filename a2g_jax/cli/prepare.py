@@ -51,18 +51,21 @@ def run(options: argparse.Namespace, _extra: list[str]) -> None:
     if options.out is None:
         raise InputError("--out is needed: the folder to make.")
     writable_folder(str(Path(options.out).parent))
-    work = _generated(options) if options.reader == "talker" else _recorded(options)
-
-    from a2g_jax.data.prepare import prepare_work
-    from a2g_jax.data.shards import Share, prepare_shard
-
     if options.shard is not None:
-        made = prepare_shard(options.out, work, Share.parse(options.shard), options.workers)
+        from a2g_jax.data.shards import Share, prepare_shard
+
+        share = Share.parse(options.shard)
+    work = _generated(options) if options.reader == "talker" else _recorded(options)
+    if options.shard is not None:
+        made = prepare_shard(options.out, work, share, options.workers)
         print(
             f"{made.path}: shard {options.shard}, {made.recordings} recordings, {made.seconds / 60:.1f} minutes; when"
             " all are there: a2g prepare --merge SHARD ... --out CORPUS"
         )
         return
+
+    from a2g_jax.data.prepare import prepare_work
+
     corpus = prepare_work(options.out, work, options.workers)
     print(_summary(corpus))
     if corpus.on_demand:

@@ -10,8 +10,8 @@
 - ``usual``: by how much the size of the motion differs from that of the training motion by more than a factor of 1.5,
   in octaves, a quarter of it. The size is the root mean square of the z-scores of the poses.
 
-Weights were chosen on 36 speeches of 16 s with 8 samples of ``demo`` and of ``demo-flow`` each; what the order is worth
-on others is measured by ``python -m experiments.ranking``.
+Weights were chosen on 36 speeches of 16 s with 8 samples of ``demo`` and of ``demo-flow`` each; none of them is among
+those on which ``python -m experiments.ranking`` measures what the order is worth.
 """
 
 from collections.abc import Iterable, Sequence

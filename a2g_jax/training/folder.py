@@ -41,7 +41,9 @@ def check_folder(out: Path, config: RunConfig, checkpoints: Checkpoints, resume:
     ]
     if _without_name(values.get("from")) != _without_name(now.get("from")):
         changed.append(f"from: {values.get('from')}, now {now.get('from')}")
-    free_settings = _FREE | _LENGTH | (frozenset() if on_demand else {"part_steps"})
+    # Without a checkpoint there is nothing to extend.
+    length = _LENGTH if checkpoints.steps() else frozenset()
+    free_settings = _FREE | length | (frozenset() if on_demand else {"part_steps"})
     for part, free in (("model_config", frozenset()), ("train_config", free_settings), ("mel", frozenset())):
         before: dict[str, Any] = values[part] if isinstance(values.get(part), dict) else {}
         changed += [

@@ -233,7 +233,8 @@ def _train(
 
 def _digest(config: RunConfig) -> bytes:
     """A hash of what all processes have to agree on."""
-    description = json.dumps([__version__, run_to_json(config, 0)], sort_keys=True)
+    # Extremes are measured by each process, and rounded by its processor.
+    description = json.dumps([__version__, run_to_json(replace(config, body_extremes=None), 0)], sort_keys=True)
     return hashlib.sha256(description.encode()).digest()
 
 

@@ -1,4 +1,6 @@
-"""Fine-tuning on four fifths of each real take, scored on the fifth that was left out, for all fifths and three seeds.
+"""Fine-tuning on four fifths of each real take, scored on the fifth that was left out, for all fifths.
+
+Three seeds; the table gives their number where it is another.
 
     python -m experiments.fine_tuning                        # Audio2Gestures, from the weights of a2g demo
     python -m experiments.fine_tuning --run demo-flow        # the flow

@@ -108,6 +108,8 @@ def test_inputs_that_do_not_fit_are_named(folder: Path):
         next(programs.rows(features(64, 20), 1, emotion=np.zeros((20, 8))))
     with pytest.raises(InputError, match="less than a frame"):
         next(programs.generate(np.zeros(100, np.float32), 1))
+    with pytest.raises(InputError, match="seed: expected 0 to"):
+        next(programs.rows(features(64, 20), 1, seed=-1))
 
 
 @pytest.mark.parametrize("name", ["../window.stablehlo", "begin.stablehlo"])

@@ -14,6 +14,7 @@ from safetensors.numpy import load_file
 from a2g_jax.errors import InputError
 from a2g_jax.features.dynamics import Dynamics, rows_with_dynamics
 from a2g_jax.features.mel import log_mel
+from a2g_jax.features.samples import mono_samples
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.generation.planting import planted
 from a2g_jax.generation.programs import manifest as files
@@ -58,9 +59,10 @@ class Programs:
             given: further inputs of the window program, such as ``emotion``: with a row for each frame of the motion.
 
         Raises:
-            InputError: audio shorter than a frame, or inputs that are missing or that the programs do not have.
+            InputError: audio with NaN, of several channels or shorter than a frame, a seed outside 0 to 2**32 - 1, or
+                inputs that are missing or that the programs do not have.
         """
-        about = self.manifest
+        about, audio = self.manifest, mono_samples(audio)
         frames = round(len(audio) / about.mel.sample_rate * about.fps)
         if frames == 0:
             raise InputError(f"the audio is {len(audio)} samples long, less than a frame; give a longer one.")
@@ -75,6 +77,8 @@ class Programs:
         Raises:
             InputError: as :meth:`generate`.
         """
+        if not 0 <= seed < 2**32:
+            raise InputError(f"seed: expected 0 to {2**32 - 1}; got {seed}.")
         frames, lanes = len(features), self.manifest.lanes
         windows = list(self._windows(features, given))
         for first in range(0, samples, lanes):
