@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, TypeVar
 
-from a2g_jax.errors import InputError, brief
+from a2g_jax.errors import InputError, UnknownFlag, brief
 
 Config = TypeVar("Config")
 
@@ -82,7 +82,7 @@ def parse_flags(pairs: Sequence[str], *owners: Any, hint: str) -> tuple[Any, ...
             raise InputError(f"unexpected argument {text!r}; settings are written --name value.")
         flag, equals, value = text.partition("=")
         if flag not in known:
-            raise InputError(f"no setting {flag}; {hint} lists them.")
+            raise UnknownFlag(flag, list(known), hint)
         number, field = known[flag]
         if not equals:
             if rest and not rest[0].startswith("--"):

@@ -50,7 +50,7 @@ REFUSED_EARLY = {
     "demo --compare --order best": "--order: orders the samples of one run; leave it out with --compare.",
     "demo --order worst": "argument --order: invalid choice: 'worst'",
     "demo --formats gif": "no format 'gif'; there are: bvh, npz, html",
-    "studio no": "no: is not a run (no run.json in it);",
+    "studio no": "no: there is no such run; name a run folder",
     "studio --port 99999": "argument --port: expected a whole number from 0 to 65535; got '99999'",
     "studio --hots x": "unknown argument --hots",
     "talk --out o --corpus no": "no: is not a corpus (no manifest.json in it); make one with 'a2g prepare'.",
@@ -58,31 +58,31 @@ REFUSED_EARLY = {
     "prepare folder no --out c": "no: there is no such folder; check the path.",
     "prepare no.py . --out c": "no.py: there is no such file; name a Python file that defines DATASET.",
     "train audio2gestures --corpus no --out r": "no: is not a corpus (no manifest.json in it);",
-    "train speech2gesture --corpus corpus --features no --out r": "no: is not a run (no run.json in it);",
-    "train audio2gestures --from no --corpus corpus --out r": "no: is not a run (no run.json in it);",
+    "train speech2gesture --corpus corpus --features no --out r": "no: there is no such run; name a run folder",
+    "train audio2gestures --from no --corpus corpus --out r": "no: there is no such run; name a run folder",
     "train stylized_flow --from demo --corpus corpus --out r": "demo: is a run of audio2gestures; train that model,",
     "train audio2gestures --from demo --preset tiny --corpus corpus --out r": "--preset: the settings are those of",
-    "prepare folder . --out c --for no": "no: is not a run (no run.json in it);",
-    "demo --compare no": "no: is not a run (no run.json in it);",
+    "prepare folder . --out c --for no": "no: there is no such run; name a run folder",
+    "demo --compare no": "no: there is no such run; name a run folder",
     "demo --compare --train": "--train and --compare exclude each other;",
     "inspect no.bvh": "no.bvh: there is no such file; check the path.",
     "inspect a.bvh --audio no.wav": "no.wav: there is no such file; check the path.",
-    "inspect no --score a.bvh --audio a.wav": "no: is not a run (no run.json in it);",
+    "inspect no --score a.bvh --audio a.wav": "no: there is no such run; name a run folder",
     "inspect demo-flow --score no.bvh --audio a.wav": "no.bvh: there is no such file; check the path.",
-    "evaluate no --corpus corpus --out o": "no: is not a run (no run.json in it);",
+    "evaluate no --corpus corpus --out o": "no: there is no such run; name a run folder",
     "evaluate demo --corpus no --out o": "no: is not a corpus (no manifest.json in it);",
-    "evaluate demo --corpus corpus --features no --out o": "no: is not a run (no run.json in it);",
-    "evaluate demo --corpus corpus --emotion-classifier demo --out o": "demo: is not a run (no run.json in it);",
+    "evaluate demo --corpus corpus --features no --out o": "no: there is no such run; name a run folder",
+    "evaluate demo --corpus corpus --emotion-classifier demo --out o": "demo: there is no such run; name a run folder",
     "evaluate --compare no --out o": "no: is no report (no report.json in it);",
     "evaluate --corpus corpus --samples 0 --out o": "--samples: expected a whole number from 1 to 1000; got '0'",
     "evaluate --corpus corpus --seed -1 --out o": "--seed: expected a whole number from 0 to 2147483647; got '-1'",
     "label ted no --classifier run": "no: there is no such folder; check the path.",
     "label talker . --classifier run": "talker: generated recordings have emotions already; name a data set.",
-    "label ted . --classifier no": "no: is not a run (no run.json in it);",
+    "label ted . --classifier no": "no: there is no such run; name a run folder",
     "retarget no.bvh --to body --out o.bvh": "no.bvh: there is no such file; check the path.",
     "retarget a.bvh --to legs --out o.bvh": "legs: there is no such file; check the path.",
     "retarget a.bvh --to body --out o.bvh --fps 0": "--fps: expected a number from 1 to 1000; got '0'",
-    "generate no --audio a.wav --out o": "no: is not a run (no run.json in it); train one with 'a2g train',",
+    "generate no --audio a.wav --out o": "no: there is no such run; name a run folder, demo, demo-flow, demo-emotion.",
     "generate demo --audio no.wav --out o": "no.wav: there is no such file; check the path.",
     "generate demo --audio a.wav --out o --pin no.bvh@1": "no.bvh: there is no such file; check the path.",
     "generate demo --audio a.wav --out o --pin-blend 1": "--pin-blend is for --pin; name a clip and a second.",
@@ -172,7 +172,7 @@ def test_early_messages_are_those_of_the_library(tmp_path, monkeypatch):
         (["prepare", "talker", "somewhere", "--out", "c"], "takes no source"),
         (["train", "audio2gestures", "--out", "r"], "--corpus is needed"),
         (["train", "audio2gestures", "--settings", "--preset", "huge"], "no preset 'huge'"),
-        (["train", "audio2gestures", "--settings", "--colour", "red"], "no setting --colour"),
+        (["train", "audio2gestures", "--settings", "--colour", "red"], "there is no flag --colour"),
         (["train", "audio2gestures", "--settings", "--steps", "many"], "--steps: expected a whole"),
         (["train", "audio2gestures", "--settings", "--kernel-size", "2"], "an odd number; got 2"),
         (["train", "audio2gestures", "--settings", "--log-every", "0"], "expected 1 or more; got 0"),
@@ -352,3 +352,18 @@ def test_a_damaged_description_of_a_run_is_named(capsys, tmp_path, damage):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "run.json").write_text(json.dumps({**values, "checksum": None, **damage}))
     assert str(tmp_path / "run" / "run.json") in fails(capsys, "generate", str(tmp_path / "run"), "--settings")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("generate demo --audio a.wav --ot x", "there is no flag --ot; did you mean --out?"),
+        ("generate demo --audio a.wav --noise-scal 2", "did you mean --noise-scale?"),
+        ("generate demo --audio a.wav --xyzzy 2", "there is no flag --xyzzy. Settings of the model"),
+        ("inspect demo --jsn", "unknown argument --jsn; did you mean --json?"),
+        ("generate dmo --audio a.wav --out x", "dmo: there is no such run; name a run folder, demo"),
+    ],
+)
+def test_what_is_mistyped_has_a_suggestion(words, message, capsys):
+    assert main(words.split()) == 2
+    assert message in capsys.readouterr().err

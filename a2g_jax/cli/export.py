@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     settings = sampling.sampling_settings(options.run, extra)
     writable_folder(options.out)
 
-    from a2g_jax.generation.programs.manifest import WINDOW
+    from a2g_jax.generation.programs.manifest import MANIFEST, WINDOW
     from a2g_jax.generation.programs.writing import PLATFORMS, export_programs
     from a2g_jax.training.run import open_run
 
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace, extra: list[str]) -> None:
     opened = open_run(options.run)
     opened = replace(opened, config=replace(opened.config, sampling=settings))
     made = export_programs(opened, options.out, options.conditions, platforms=options.platforms or PLATFORMS)
-    print(f"{options.out}: {', '.join(made.files)}")
+    print(f"{options.out}: {', '.join((MANIFEST, *made.files))}")
     for name, port in made.programs[WINDOW]["inputs"].items():
         print(f"  {name}: {port.dtype}{list(port.shape)}{f', {port.meaning}' if port.meaning else ''}")
     print(f"next: a2g_jax.Programs({str(options.out)!r}).generate(audio, samples=5)")

@@ -5,12 +5,13 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from types import ModuleType
 from typing import Any, NoReturn
 
 from a2g_jax import __version__
 from a2g_jax.cli import demo, evaluate, export, generate, inspect, label, prepare, retarget, serve, studio, talk, train
-from a2g_jax.errors import A2GError, InputWarning, Interrupted
+from a2g_jax.errors import A2GError, InputWarning, Interrupted, UnknownFlag
 
 #: The module of each command: ``DESCRIPTION``, ``add_arguments(parser)`` and ``run(options, extra)``, which returns
 #: the exit status or None for 0. With ``TAKES_SETTINGS``, unknown flags are ``extra``.
@@ -59,6 +60,13 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def flags_of(parser: argparse.ArgumentParser, command: str) -> list[str]:
+    """The long flags of a command."""
+    (commands,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    actions = commands.choices[command]._actions
+    return [flag for action in actions for flag in action.option_strings if flag.startswith("--")]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
@@ -69,9 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: after ``--help`` and ``--version``, and with status 2 for arguments that argparse refuses.
     """
-    options, extra = make_parser().parse_known_args(arguments)
+    parser = make_parser()
+    options, extra = parser.parse_known_args(arguments)
     if extra and not getattr(COMMANDS[options.command], "TAKES_SETTINGS", False):
-        print(f"a2g: unknown argument {extra[0]} (see 'a2g {options.command} --help')", file=sys.stderr)
+        hint = f"(see 'a2g {options.command} --help')"
+        similar = get_close_matches(extra[0].partition("=")[0], flags_of(parser, options.command), 1, 0.7)
+        question = f"; did you mean {similar[0]}?" if similar else ""
+        print(f"a2g: unknown argument {extra[0]}{question} {hint}", file=sys.stderr)
         return 2
     try:
         with warnings.catch_warnings():
@@ -92,6 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.debug:
             raise
         status, line = _explain(error)
+        if isinstance(error, UnknownFlag):
+            line = error.among(flags_of(parser, options.command))
         try:
             sys.stdout.flush()
         except OSError:  # a full disk; Python would complain again at its end

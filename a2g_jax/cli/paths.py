@@ -4,12 +4,12 @@ The messages are those of :func:`~a2g_jax.io.files.check_readable`, :func:`~a2g_
 :meth:`~a2g_jax.data.corpus.Corpus.open`.
 """
 
-from collections.abc import Container
+from collections.abc import Collection
 from pathlib import Path
 
 from a2g_jax.errors import InputError
 from a2g_jax.io.files import check_folder_writable
-from a2g_jax.training.run_file import SHIPPED, SHIPPED_FEATURES
+from a2g_jax.training.run_file import SHIPPED, SHIPPED_FEATURES, no_run
 
 
 def existing_file(path: str | None, remedy: str = "check the path") -> None:
@@ -32,14 +32,14 @@ def existing_folder(path: str) -> None:
         raise InputError(f"{Path(path)}: there is no such folder; check the path.")
 
 
-def existing_run(name: str | None, shipped: Container[str] = SHIPPED) -> None:
+def existing_run(name: str | None, shipped: Collection[str] = SHIPPED) -> None:
     """Refuse what is neither a run folder nor the name of a run that comes with the package; None passes.
 
     Raises:
         InputError: no ``run.json`` in the folder.
     """
     if name is not None and name not in shipped and not (Path(name) / "run.json").is_file():
-        raise InputError(f"{Path(name)}: is not a run (no run.json in it); train one with 'a2g train', or use 'demo'.")
+        raise no_run(Path(name), shipped)
 
 
 def existing_features(name: str | None) -> None:

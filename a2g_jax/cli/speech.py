@@ -41,7 +41,7 @@ def range_warning(run: "Run", name: str, audio: Any, path: str) -> str:
     if not found:
         return ""
     what = "; ".join(map(str, found))
-    return f"warning: {path}: is outside what {name} was trained on: {what}. Its motion may fit less well."
+    return f"note: {path}: differs from the speech that {name} was trained on: {what}. Its motion may fit less well."
 
 
 def warn_of_range(run: "Run", name: str, audio: Any, path: str) -> None:

@@ -34,7 +34,7 @@ _UNITS: dict[str, _Unit] = {
     "rate": _Unit("rate", "syllables/s", 1),
     "balance": _Unit("sound above 1 kHz", "dB", 0),
     "change": _Unit("change of the spectrum", "dB", 1),
-    "spectrum": _Unit("distance from the mean spectrum", "standard deviations", 1),
+    "spectrum": _Unit("sound of voice, room or microphone", "standard deviations from the mean spectrum", 1),
 }
 
 

@@ -1,6 +1,7 @@
 """The description of a run in its folder, ``run.json``; importable without JAX."""
 
 import os
+from collections.abc import Collection
 from dataclasses import fields
 from importlib import resources
 from pathlib import Path
@@ -38,6 +39,18 @@ def run_folder(name: str | os.PathLike[str], shipped: dict[str, str] = SHIPPED) 
     return Path(name)
 
 
+def no_run(folder: Path, shipped: Collection[str] = ()) -> InputError:
+    """The error of a folder that is not there, or holds no run.
+
+    Args:
+        shipped: names of the runs of the package that would do.
+    """
+    if not folder.exists():
+        others = "".join(f", {name}" for name in shipped)
+        return InputError(f"{folder}: there is no such run; name a run folder{others}.")
+    return InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
+
+
 def read_description(folder: Path) -> dict[str, Any]:
     """The contents of ``run.json``.
 
@@ -46,7 +59,7 @@ def read_description(folder: Path) -> dict[str, Any]:
     """
     about = folder / RUN_FILE
     if not about.is_file():
-        raise InputError(f"{folder}: is not a run (no {RUN_FILE} in it); train one with 'a2g train', or use 'demo'.")
+        raise no_run(folder, SHIPPED)
     values = read_sealed(about, SEALED_WITH)
     if not isinstance(values, dict) or values.get("format") != FORMAT:
         raise InputError(f"{about}: is not the description of a run; train one with 'a2g train'.")

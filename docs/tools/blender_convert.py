@@ -72,4 +72,7 @@ def main(source: str, target: str, fps: str = "30") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[sys.argv.index("--") + 1 :])
+    given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if len(given) not in (2, 3):
+        sys.exit("blender -b --python blender_convert.py -- IN.fbx OUT.glb [FPS]")
+    main(*given)

@@ -81,7 +81,7 @@ def test_one_line_says_what_and_by_how_much(runs, capsys):
     warn_of_range(runs["demo"], "demo", demo_speech().audio, "usual.wav")
     text = capsys.readouterr()
     (line,) = (text.out + text.err).splitlines()
-    assert line.startswith("warning: kid.wav: is outside what demo was trained on: pitch 4")
+    assert line.startswith("note: kid.wav: differs from the speech that demo was trained on: pitch 4")
     assert "(training speech: 78 to 347)" in line
 
 

@@ -189,7 +189,7 @@ def test_runs_of_one_name_are_refused(tmp_path):
     for folders in ([tmp_path / "a/run", tmp_path / "b/run"], [tmp_path / "demo"]):
         with pytest.raises(InputError, match="rename the folder"):
             named_runs([str(folder) for folder in folders])
-    with pytest.raises(InputError, match="is not a run"):
+    with pytest.raises(InputError, match="there is no such run"):
         named_runs([str(tmp_path / "none")])
 
 
@@ -200,7 +200,7 @@ def test_a_take_names_speech_unlike_the_training_speech(tmp_path, monkeypatch):
     take = generate_take(
         ["demo", f"--audio={tmp_path / 'tone.wav'}", "--formats=npz"], tmp_path, Job("take 1", lambda job: None)
     )
-    assert f"{tmp_path / 'tone.wav'}: is outside what demo was trained on: pitch 4" in take.lines[0]
+    assert f"{tmp_path / 'tone.wav'}: differs from the speech that demo was trained on: pitch 4" in take.lines[0]
 
 
 def test_the_demo_says_what_it_can_do():

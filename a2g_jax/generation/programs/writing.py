@@ -10,7 +10,7 @@ import numpy as np
 from flax.traverse_util import flatten_dict, unflatten_dict
 from jax import export as jax_export
 from jax.interpreters import partial_eval
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.engine import LANES, WINDOW, Engine
@@ -82,10 +82,9 @@ def export_programs(
             temporary.write_bytes(exported.serialize())
         outputs = jax.eval_shape(function, weights, given)
         ports[name] = {"inputs": _described(given), "outputs": _described(outputs)}
+    arrays = {name: np.require(value, requirements="C") for name, value in (kept | _finish(run)).items()}
     with atomic_path(folder / files.WEIGHTS) as temporary:
-        save_file(
-            {name: np.require(value, requirements="C") for name, value in (kept | _finish(run)).items()}, temporary
-        )
+        temporary.write_bytes(save(arrays))  # save_file makes files that nobody else may read
     made = Manifest(
         model=run.config.model,
         run={"preset": run.config.preset, "steps": run.steps},
