@@ -238,3 +238,14 @@ def test_stages_are_scaled_with_the_steps_of_a_table():
     assert full[table3.BASELINE].changes["vae_steps"] == 0
     others = {name: variant for name, variant in table2.VARIANTS.items() if variant.model != "emotion_gesture"}
     assert {name: scaled(table2.VARIANTS, 5)[name] for name in others} == others
+
+
+def test_trainings_are_put_side_by_side(tmp_path):
+    from experiments.emotion_gesture import trainings
+
+    judged = {"emotions": ["anger"], "seeds": [0], "run": {"scores": {"requested_accuracy": {"mean": 0.5}}}}
+    judged[trainings.TRUTH] = {"scores": {"requested_accuracy": {"mean": 0.6}}}
+    first = trainings.scores_of(judged)
+    page = trainings.page([first, {"requested_accuracy": 0.7}], trainings.scores_of(judged, trainings.TRUTH))
+    # Half the width of the interval of two values is 12.706 times half of their difference.
+    assert "| requested accuracy | 0.50 | 0.70 | 0.60 ± 1.27 | 0.60 |" in page
