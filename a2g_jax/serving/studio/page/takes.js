@@ -164,7 +164,7 @@ function row(take, sample) {
   const one = { take: take.id, sample: sample.number, speech: take.speech.id }, on = isShown(take.id, sample.number);
   const eye = make("button", { type: "button", class: "eye", "aria-pressed": String(on), "data-key": `eye-${take.id}-${sample.number}`, title: on ? "In the player; press to take it out" : "Press to see it in the player, beside the others", onclick: () => toggle(one) }, `sample ${sample.number}`);
   const best = take.count > 1 && take.samples.every((other) => other.score <= sample.score);
-  const score = sample.score === null ? null : make("span", { class: best ? "score best" : "score", title: "How well the motion goes with the speech; higher is better" }, `score ${sample.score.toFixed(2)}${best ? ", best" : ""}`);
+  const score = sample.score === null ? null : make("span", { class: best ? "score best" : "score", title: "How well the motion goes with the speech; higher is better" }, `${best ? "best:" : "score"} ${sample.score.toFixed(2)}`);
   return make("div", { class: "sample" }, eye, stars(take, sample), score, make("span", { class: "gap" }), make("span", { class: "files" }, make("span", { class: "soft" }, "Download"), about.formats.map((format) => file(take, sample, format))), sample.note && make("p", { class: "note" }, sample.note));
 }
 
