@@ -12,7 +12,7 @@ from a2g_jax.cli.argument_types import number
 from a2g_jax.cli.paths import existing_run
 from a2g_jax.errors import InputError
 from a2g_jax.serving.run import check_extra, exposure, listen, serve
-from a2g_jax.training.run_file import SHIPPED
+from a2g_jax.training.run_file import SHIPPED, SHIPPED_TITLES
 
 if TYPE_CHECKING:
     from a2g_jax.generation.capabilities import Capabilities
@@ -113,7 +113,7 @@ def make_studio(systems: dict[str, str], first: str) -> "Studio":
     def make(arguments: Sequence[str], folder: Path, job: "Job") -> "Outcome":
         return generate_take(arguments, folder, job, opened(arguments[0]))
 
-    return Studio(systems, describe, make, first=first)
+    return Studio(systems, describe, make, first=first, titles=SHIPPED_TITLES)
 
 
 def add_demo_speech(studio: "Studio") -> None:
@@ -188,7 +188,9 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         notes=tuple(note for note, _ in described),
         tracks=tuple(tracks for _, tracks in described),
         scores=_scores(folder),
-        lines=tuple(filter(None, (ready.warning, *ready.lines, *checked.lines(), *ready.report(folder)))),
+        lines=tuple(filter(None, (*ready.lines, *checked.lines(), *ready.report(folder)))),
+        plain=checked.plain(),
+        warning=ready.warning,
     )
 
 

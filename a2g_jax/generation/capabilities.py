@@ -76,11 +76,14 @@ def capabilities(run: Run) -> Capabilities:
         pass  # none, or weights that store too little for them
     stored = config.sampling_settings
     has_emotion = any(field.name == "emotion" for field in dataclasses.fields(stored))
+    emotions = tuple(config.corpus.get("emotions", ())) if has_emotion else ()
+    # Where there is a setting, the control of its name sets the same.
+    choices = {name: values for name, values in categories.items() if name != "emotion" or not emotions}
     return Capabilities(
         title=f"{config.model}, {config.fps:g} frames a second",
         controls=tuple(public_name(name) for name in names if public_name(name) not in categories),
-        categories=categories,
-        emotions=tuple(config.corpus.get("emotions", ())) if has_emotion else (),
+        categories=choices,
+        emotions=emotions,
         styles=model.encode is not None,
         seed_clips=model.seed_frames > 0,
         settings=tuple(_settings(stored, dataclasses.asdict(config.model_config))),

@@ -130,6 +130,13 @@ class Checked:
         first = f"checked: {good} of {len(self.reports)} within the bounds of {self.bounds.source}{note}"
         return [first, *(line for report in self.reports for line in report.lines())]
 
+    def plain(self) -> str:
+        """The first of :meth:`lines` for people who do not program."""
+        good, every = sum(not report.findings for report in self.reports), len(self.reports)
+        if every == 1:
+            return f"checked: it {'looks' if good else 'does not look'} physically possible"
+        return f"checked: {'all' if good == every else f'{good} of'} {every} look physically possible"
+
     def _check(self, audio: Audio, seed: int, sample: int, draft: Draft) -> tuple[Draft, SampleReport]:
         first = check_motion(draft.motion, self.bounds, self.stretches)
         kept, draws = self._eased(draft, first), 1

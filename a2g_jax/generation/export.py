@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from a2g_jax.errors import InputError
@@ -105,7 +106,8 @@ def export(
                 if PAGE in formats:
                     findings = checked.reports[done - 1].findings
                     names = files.names(done - 1)
-                    figures.append(checked_figure(made.shown, f"sample {done - 1}", findings, files=names))
+                    figure = checked_figure(made.shown, f"sample {done - 1}", findings, files=names)
+                    figures.append(replace(figure, number=done - 1))
                 if not checked.strict:
                     report(done)
         finally:
@@ -115,7 +117,7 @@ def export(
         if scores is not None:
             scores[:] = ranked
         if figures:
-            figures = [figures[one.sample] for one in ranked] or figures
+            figures = [_scored(figures[one.sample], one) for one in ranked] or figures
             write_page(
                 files.folder / "index.html",
                 figures,
@@ -128,6 +130,11 @@ def export(
                 footer=f"{config.model}, {config.preset} preset, {run.steps} training steps, seed {seed}",
             )
     return {kind: 1 if kind == PAGE else samples for kind in formats}
+
+
+def _scored(figure: Figure, score: "Score") -> Figure:
+    """The figure with its score in the text under it."""
+    return replace(figure, note="; ".join(filter(None, (f"score {score.score:.2f}", figure.note))))
 
 
 def _order_to_json(ranked: "Sequence[Score]") -> dict[str, Any]:

@@ -24,6 +24,8 @@ SEALED_WITH = ("weights_sha256",)
 SHIPPED = {"demo": "demo", "demo-flow": "demo_flow", "demo-emotion": "demo_emotion"}
 #: The same of the shipped feature network.
 SHIPPED_FEATURES = {"demo": "demo_features"}
+#: What programs with a form call the runs.
+SHIPPED_TITLES = {"demo": "Lively", "demo-flow": "Flow", "demo-emotion": "Emotion"}
 
 #: Sampling settings that runs of version 0.1 kept among those of the model, by their names then.
 _MOVED = {"control_curves": "controls"}

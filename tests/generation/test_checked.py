@@ -72,6 +72,7 @@ def test_good_samples_stay_as_they_are(run):
     assert sampler.drawn == [(7, 0), (7, 1), (7, 2)]
     assert [report.draws for report in checked.reports] == [1, 1, 1]
     assert checked.lines() == ["checked: 3 of 3 within the bounds of any person"]
+    assert checked.plain() == "checked: all 3 look physically possible"
 
 
 def test_a_bad_sample_is_drawn_again(run):
@@ -122,6 +123,7 @@ def test_a_sample_that_stays_bad_is_reported(run, tmp_path):
     assert (worst["joint"], worst["first"]) == ("L_Knee", 60)
     assert worst["value"] > worst["bound"] == written["bounds"][worst["figure"]]["L_Knee"]
     assert "sample 1: OUTSIDE THE BOUNDS OF A BODY after 4 draws" in "".join(checked.lines())
+    assert checked.plain() == "checked: 1 of 2 look physically possible"
     assert "outside the bounds of a body at 2.0" in (tmp_path / "index.html").read_text()
 
 

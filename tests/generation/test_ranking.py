@@ -13,6 +13,7 @@ from a2g_jax.generation.ranking import Scorer
 from a2g_jax.talker.recordings import resample_motion, talk
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.run import Run
+from tests.viz.test_player_page import page_data
 
 SPEECH = talk(10.0, 3)
 
@@ -94,6 +95,9 @@ def test_export_keeps_names_and_writes_the_order(run, tmp_path):
     page, plain = ((tmp_path / folder / "index.html").read_text() for folder in ("best", "plain"))
     assert page.index('"sample 2"') < page.index('"sample 1"') < page.index('"sample 0"')
     assert plain.index('"sample 0"') < plain.index('"sample 1"')
+    figures = page_data(page)["figures"]
+    assert [figure["number"] for figure in figures] == order  # the colour of a sample is the same in any order
+    assert [figure["note"].split(";")[0] for figure in figures] == [f"score {one.score:.2f}" for one in scores]
     assert "best first" in page
     assert "best first" not in plain
     with pytest.raises(InputError, match="order 'worst': expected number or best"):

@@ -88,6 +88,33 @@ def test_the_figure_follows_the_microphone(browser, live):
         assert live.service.clients == 0
 
 
+def slow_drawing(page, milliseconds):
+    """Every picture takes at least so long."""
+    page.evaluate(
+        "(time) => { const draw = CanvasRenderingContext2D.prototype.restore;"
+        " CanvasRenderingContext2D.prototype.restore = function () {"
+        " draw.call(this); const end = performance.now() + time; while (performance.now() < end); }; }",
+        milliseconds,
+    )
+
+
+def test_slow_drawing_takes_no_time_from_messages(browser, live):
+    with page_of(browser, live.url) as page:
+        slow_drawing(page, 400)
+        page.click("#speak")
+        wait_until(page, "a2gLive.frames() > 90")
+        late = [page.evaluate("a2gLive.newest() - a2gLive.time()") for _ in range(10) if not page.wait_for_timeout(150)]
+        assert max(late) <= 1.7  # a second, and what arrived during a picture
+        assert page.evaluate("a2gLive.scale()") < 0.9
+
+
+def test_a_page_that_draws_too_slowly_says_so(browser, live):
+    with page_of(browser, live.url) as page:
+        slow_drawing(page, 2600)
+        page.click("#speak")
+        wait_until(page, "document.getElementById('status').textContent.includes('make the window smaller')")
+
+
 def test_controls_are_large_enough_for_fingers_and_fit_a_phone(browser, live):
     with page_of(browser, live.url, has_touch=True, is_mobile=True) as page:
         sizes = page.evaluate(

@@ -50,7 +50,13 @@ class Generator:
         name = arguments[1].rpartition("/")[2]
         lanes = (Track("pins", ((0.0, 0.5, f"clip {name}", "#336699"),)),)
         return Outcome(
-            SECONDS, f"for {name}", lanes, ("", "outside")[:count], (), tuple(map(float, range(count))), ("fine",)
+            SECONDS,
+            f"for {name}",
+            lanes,
+            ("", "outside")[:count],
+            scores=tuple(map(float, range(count))),
+            lines=("fine",),
+            warning=f"warning: {arguments[1].partition('=')[2]}: is unusual",
         )
 
 
@@ -69,7 +75,7 @@ def studio(generator, recording, tmp_path):
     about = Capabilities(
         title="fake", controls=("energy",), settings=(Setting("warmth", 1.0, "float", False, False, ""),)
     )
-    with Studio({"fake": "fake-run"}, lambda run: about, generator, takes=3) as made:
+    with Studio({"fake": "fake-run"}, lambda run: about, generator, titles={"fake": "Plain"}, takes=3) as made:
         write_audio(tmp_path / "demo.wav", recording.audio, 16000)
         made.add_speech("demo", "the demo", tmp_path / "demo.wav", (Word("hello", 0.1, 0.4),))
         yield made
@@ -201,6 +207,7 @@ def test_errors_name_the_field_and_the_clients_file(client, studio, recording):
     assert state["job"]["error"] == {"field": "controls.energy", "message": "Müller.wav is too calm."}
     take = generate(client, studio, speech=upload["id"])
     assert studio.find(take).outcome.lanes[0].spans[0][2] == "clip Müller.wav"
+    assert studio.find(take).outcome.warning == "warning: Müller.wav: is unusual"
 
 
 @pytest.mark.parametrize(
@@ -299,7 +306,9 @@ def test_films_wait_in_the_queue_and_can_be_cancelled(client, studio, monkeypatc
 
     monkeypatch.setattr("a2g_jax.viz.player.video.write_video", film)
     monkeypatch.setattr("a2g_jax.viz.player.video.check_video", lambda: None)
-    assert client.get("/api/about").json()["slow"] == {"mp4": ""}
+    about = client.get("/api/about").json()
+    assert about["slow"] == {"mp4": ""}
+    assert about["titles"] == {"fake": "Plain"}
     assert client.post(f"/api/takes/{take}/films/0/mp4").status_code == 202
     assert reached.wait(5)
     job = studio.find(take).films[0, "mp4"]

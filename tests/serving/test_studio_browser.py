@@ -75,7 +75,7 @@ def page(browser, url):
     opened.on("console", lambda message: troubles.append(message.text) if message.type == "error" else None)
     opened.on("pageerror", lambda error: troubles.append(str(error)))
     opened.goto(url)
-    opened.locator("#system-about", has_text="frames a second").wait_for()
+    opened.locator("#system-about", has_text="You can choose").wait_for()
     yield opened
     context.close()
     assert [text for text in troubles if "status of 4" not in text] == []

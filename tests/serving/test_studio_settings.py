@@ -13,6 +13,7 @@ from a2g_jax.serving.studio.readers import KINDS
 from a2g_jax.serving.studio.settings import FieldError, field_of, read_request
 from a2g_jax.serving.studio.uploads import Upload, Uploads
 from a2g_jax.training.run import open_run
+from a2g_jax.training.run_file import SHIPPED, SHIPPED_TITLES
 
 #: Settings of all systems of these tests.
 SETTINGS = ("temperature", "denoise", "edit")
@@ -200,7 +201,11 @@ def test_a_take_names_speech_unlike_the_training_speech(tmp_path, monkeypatch):
     take = generate_take(
         ["demo", f"--audio={tmp_path / 'tone.wav'}", "--formats=npz"], tmp_path, Job("take 1", lambda job: None)
     )
-    assert f"{tmp_path / 'tone.wav'}: differs from the speech that demo was trained on: pitch 4" in take.lines[0]
+    assert f"{tmp_path / 'tone.wav'}: differs from the speech that demo was trained on: pitch 4" in take.warning
+
+
+def test_every_shipped_run_has_a_title():
+    assert set(SHIPPED_TITLES) == set(SHIPPED)
 
 
 def test_the_demo_says_what_it_can_do():
@@ -222,6 +227,7 @@ def test_the_other_shipped_runs_say_what_they_can_do():
     flow, emotion = (capabilities(open_run(name)) for name in ("demo-flow", "demo-emotion"))
     assert (flow.styles, flow.seed_clips, emotion.styles, emotion.seed_clips) == (True, True, False, True)
     assert "anger" in emotion.emotions
+    assert "emotion" not in emotion.categories  # one field for both flags
     assert {"temperature", "denoise", "style-gain"} <= {one.name for one in flow.settings}
 
 

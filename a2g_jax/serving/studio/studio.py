@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any
 
 from a2g_jax.errors import InputError
@@ -47,6 +47,7 @@ class Studio:
         generate: Generate,
         *,
         first: str | None = None,
+        titles: Mapping[str, str] = MappingProxyType({}),
         kinds: Mapping[str, Kind] = KINDS,
         takes: int = MOST_TAKES,
     ) -> None:
@@ -56,11 +57,13 @@ class Studio:
             describe: what can be requested of a run.
             generate: generates a take.
             first: the system that the page begins with.
+            titles: plain words for systems, by their names.
             kinds: of uploads.
             takes: that are kept.
         """
         self.systems, self._describe, self._generate = dict(systems), describe, generate
         self.first = first or next(iter(self.systems))
+        self._titles = dict(titles)
         self._kinds, self._most = kinds, takes
         self.takes: dict[str, Take] = {}
         self._made = 0
@@ -126,6 +129,7 @@ class Studio:
         built_in = [upload.to_json() for upload in self.uploads.all() if upload.keep]
         return {
             "systems": list(self.systems),
+            "titles": {name: self._titles.get(name, "") for name in self.systems},
             "first": self.first,
             "speeches": built_in,
             "formats": list(formats()),

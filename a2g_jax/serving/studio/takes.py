@@ -45,6 +45,10 @@ class Outcome:
     """Of each sample, higher is better; none where samples have no score."""
     lines: tuple[str, ...] = ()
     """Reports on the whole, for the user."""
+    plain: str = ""
+    """The most important one in plain words; the page shows the others on request."""
+    warning: str = ""
+    """About the speech; shown at once."""
 
 
 #: Generates: the arguments of ``a2g generate``, the folder, and the job that progress is reported to.
@@ -137,12 +141,16 @@ class Take:
         found = motion_format(format)
         return f"take{self.number}_sample{sample}{'' if found is None else found.suffix}"
 
-    def figure(self, sample: int, label: str = "") -> Figure:
-        """A sample on the page."""
+    def figure(self, sample: int, label: str = "", number: int | None = None) -> Figure:
+        """A sample on the page.
+
+        Args:
+            number: picks its colour; None for its place on the page.
+        """
         outcome = self.outcome
         note = outcome.notes[sample] if sample < len(outcome.notes) else ""
         tracks = outcome.tracks[sample] if sample < len(outcome.tracks) else ()
-        return Figure(self.motion(sample), label or f"sample {sample}", note, tracks)
+        return Figure(self.motion(sample), label or f"sample {sample}", note, tracks, number=number)
 
     def order(self, by: str = "made") -> list[int]:
         """Samples in an order: ``made``, ``stars`` or ``score``, the best first."""
@@ -212,6 +220,7 @@ class Take:
             for sample in range(self.request.samples)
         ]
         about = {"seconds": outcome.seconds, "subtitle": outcome.subtitle, "lines": list(outcome.lines)}
+        about |= {"plain": outcome.plain, "warning": outcome.warning}
         return {**found, **about, "samples": samples}
 
     def _there(self, sample: int, format: str) -> bool:
@@ -260,7 +269,9 @@ def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
         raise InputError("samples of different speeches cannot be played together; choose takes of one speech.")
     first, several = takes[0], len(takes) > 1
     label = "take {}, sample {}" if several else "sample {1}"
-    figures = [take.figure(sample, label.format(take.number, sample)) for take, sample in chosen]
+    figures = [
+        take.figure(sample, label.format(take.number, sample), None if several else sample) for take, sample in chosen
+    ]
     longest = max(figures, key=lambda figure: figure.motion.frames * figure.motion.skeleton.joints).motion
     check_page_size(len(figures), longest.frames, longest.skeleton.joints)
     audio, rate = first.speech()
@@ -284,4 +295,5 @@ def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:
         for lane in outcome.lanes
     )
     lines = tuple(named(line, used) for line in outcome.lines)
-    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines)
+    warning = named(outcome.warning, used)
+    return replace(outcome, subtitle=named(outcome.subtitle, used), lanes=lanes, lines=lines, warning=warning)

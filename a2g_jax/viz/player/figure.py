@@ -110,3 +110,5 @@ class Figure:
     tracks: tuple[Lane, ...] = ()
     files: tuple[str, ...] = ()
     """Names of its files in the folder of the page, which offers them."""
+    number: int | None = None
+    """Picks the colour, so that it stays the same in any order of the figures; None for the place on the page."""

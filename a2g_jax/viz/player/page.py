@@ -162,6 +162,7 @@ def _figure(figure: Figure) -> dict:
     return {
         "label": figure.label,
         "note": figure.note,
+        "number": figure.number,
         "frames": motion.frames,
         "tracks": [track.encoded() for track in figure.tracks],
         "files": list(figure.files),

@@ -2,6 +2,8 @@
 
 const SHOWN_BEHIND = 0.12; // seconds between the newest frame and the one that is shown
 const BACKLOG = 10; // seconds of audio without frames, from which on server or connection are too slow
+const LATE = 1.5; // seconds beyond what the model waits, from which on the page gives the reason
+const FEW = 0.2; // seconds a picture, from which on drawing is the reason
 
 const at = (id) => document.getElementById(id);
 const seconds = (value) => `${value.toFixed(2)} s`;
@@ -11,7 +13,8 @@ class Live {
     this.stage = new LiveStage();
     this.state = "idle";
     this.loudness = 0;
-    this.frames = 0;
+    this.frames = this.behind = this.interval = 0;
+    this.late = false;
     at("speak").addEventListener("click", () => (this.state === "idle" ? this.start() : this.stop("Stopped.")));
     this.toggle("trails", (on) => { this.stage.trails = on; this.stage.wake(); });
     this.toggle("echo", (on) => { if (this.gain) this.gain.gain.value = on ? 1 : 0; });
@@ -122,7 +125,7 @@ class Live {
   }
 
   tick(stamp) {
-    const elapsed = clamp((stamp - (this.stamp || stamp)) / 1000, 0, 0.25);
+    const elapsed = Math.max((stamp - (this.stamp || stamp)) / 1000, 0);
     this.stamp = stamp;
     const level = this.state === "live" ? this.loudness : 0;
     at("level").firstElementChild.style.transform = `scaleX(${level.toFixed(3)})`;
@@ -132,12 +135,23 @@ class Live {
       this.stage.time = this.playhead.advance(elapsed, this.figure.newest);
       // Since its last piece, the microphone has gone on.
       const now = this.sent + Math.min((performance.now() - this.arrived) / 1000, 0.5), behind = now - this.stage.time;
-      this.behind = this.behind ? mix(this.behind, behind, 0.05) : behind;
+      this.behind = this.behind ? mix(this.behind, behind, 1 - Math.exp(-elapsed / 0.4)) : behind;
+      this.interval = mix(this.interval, elapsed, 1 - Math.exp(-elapsed));
+      this.explain(this.behind - this.latency);
       this.delay.delayTime.setTargetAtTime(clamp(this.behind, 0, 20), this.context.currentTime, 1);
       this.write("behind", seconds(this.behind));
       this.write("frames", String(this.frames));
     } else if (this.sent) this.write("behind", "–");
     return true;
+  }
+
+  // The reason for a delay that is longer than what the model waits, until it is gone.
+  explain(late) {
+    if (this.late ? late > LATE - 0.5 : late <= LATE) return;
+    this.late = !this.late;
+    if (!this.late) this.say("Speak: the figure follows.");
+    else if (this.interval > FEW) this.say("This computer draws too slowly: make the window smaller.", true);
+    else this.say("The frames arrive late: the server or the connection is slow.", true);
   }
 
   write(id, text) { if (at(id).textContent !== text) at(id).textContent = text; }
@@ -148,7 +162,8 @@ class Live {
     if (this.microphone) for (const track of this.microphone.getTracks()) track.stop();
     if (this.context) this.context.close().catch(() => {});
     this.socket = this.microphone = this.context = this.gain = this.refused = null;
-    this.behind = 0;
+    this.behind = this.interval = 0;
+    this.late = false;
     this.become("idle");
     this.say(text, trouble);
   }
@@ -162,6 +177,9 @@ window.a2gLive = {
   frames: () => live.frames,
   behind: () => live.behind,
   time: () => live.stage.time,
+  newest: () => live.stage.figure.newest,
+  interval: () => live.interval,
+  scale: () => live.stage.renderer.scale,
   pose: () => Array.from(live.stage.figure.pose),
   renderer: () => live.stage.renderer.name,
 };

@@ -25,7 +25,7 @@ class LiveFigure extends Figure {
 }
 
 // The time that is shown: it advances as time does, and stays a little behind the newest frame, so that frames that
-// arrive in groups, and not evenly, are shown evenly.
+// arrive in groups, and not evenly, are shown evenly. Where it is a second late, as pictures are few, it jumps.
 class Playhead {
   constructor(behind) { this.behind = behind; this.time = null; }
 

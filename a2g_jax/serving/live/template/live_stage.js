@@ -5,6 +5,7 @@ class LiveStage {
     this.stage = document.getElementById("stage");
     this.scheme = matchMedia("(prefers-color-scheme: dark)");
     this.renderer = makeRenderer(document.getElementById("view"), location.hash !== "#2d");
+    this.pace = new Pace(this.renderer);
     this.camera = { ...START };
     this.bands = [];
     this.figure = null;
@@ -20,17 +21,21 @@ class LiveStage {
 
   view(change) { Object.assign(this.camera, change); this.wake(); }
 
-  // `ticking`, if set, is called before each picture and says whether another one follows.
+  // A picture of the latest state once the one before is complete. `ticking`, if set, is called before each picture and
+  // returns whether another one follows.
   wake() {
-    if (this.pending) return;
-    this.pending = requestAnimationFrame((stamp) => {
-      this.pending = 0;
-      const more = this.ticking ? this.ticking(stamp) : false;
-      this.draw(false);
+    this.wanted = true;
+    if (this.drawing) return;
+    this.drawing = true;
+    requestAnimationFrame((stamp) => {
+      this.wanted = this.ticking ? this.ticking(stamp) : false;
       clearTimeout(this.settling);
-      if (more) this.wake();
-      // A picture that stays a while is drawn again at full quality, where the moving one is simpler.
-      else if (this.renderer.software || this.renderer.scale < 1) this.settling = setTimeout(() => this.draw(true), 400);
+      this.pace.picture(() => this.draw(false), () => {
+        this.drawing = false;
+        if (this.wanted) this.wake();
+        // A picture that stays a while is drawn again at full quality, where the moving one is simpler.
+        else if (this.renderer.software || this.renderer.scale < 1) this.settling = setTimeout(() => this.draw(true), 400);
+      });
     });
   }
 

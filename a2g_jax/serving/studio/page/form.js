@@ -25,7 +25,7 @@ export async function beginForm(about, onTake) {
   find("style-share").addEventListener("input", ({ target }) => { target.nextElementSibling.textContent = number(Number(target.value)); });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => { const field = find("samples"); field.value = Math.min(Math.max(Number(field.value) + Number(button.dataset.step), 1), about.most_samples); });
   find("dice").addEventListener("click", () => { find("seed").value = Math.floor(Math.random() * 100000); });
-  find("systems").replaceChildren(...about.systems.map((name) => make("button", { type: "button", role: "radio", class: "chip", "aria-checked": "false", "data-name": name, onclick: () => chooseSystem(name) }, name)));
+  find("systems").replaceChildren(...about.systems.map((name) => make("button", { type: "button", role: "radio", class: "chip", "aria-checked": "false", "data-name": name, onclick: () => chooseSystem(name) }, about.titles[name] || name, about.titles[name] && make("span", { class: "soft" }, `(${name})`))));
   find("form").addEventListener("submit", (event) => { event.preventDefault(); submit(onTake); });
   await chooseSystem(about.first);
 }
@@ -48,10 +48,11 @@ async function chooseSystem(name) {
   if (state.system !== name) return;
   const can = described.get(name), kept = controlValues();
   says.textContent = summary(can);
+  says.title = can.title;
   const change = () => summaries();
   state.controls = can.controls.map((control) => new Control(control, speech(), change));
-  state.choices = Object.entries(can.categories).map(([control, values]) => new Choice(control, values, "free", speech(), change, `controls.${control}`));
-  state.emotion = can.emotions.length ? new Choice("emotion", can.emotions, "from the voice", speech(), change, "emotion") : null;
+  state.choices = Object.entries(can.categories).map(([control, values]) => new Choice(control, values, "any", speech(), change, `controls.${control}`));
+  state.emotion = can.emotions.length ? new Choice("emotion", can.emotions, "from the speech", speech(), change, "emotion") : null;
   for (const part of [...state.controls, ...state.choices]) if (kept[part.name] !== undefined) part.set(kept[part.name]);
   const emotional = [...state.choices, state.emotion].filter((part) => part);
   find("emotion").replaceChildren(...emotional.map((part) => part.element));
@@ -68,11 +69,11 @@ async function chooseSystem(name) {
 
 function summary(can) {
   const parts = [];
-  if (can.controls.length) parts.push(`controls: ${can.controls.join(", ")}`);
-  if (can.emotions.length || Object.keys(can.categories).length) parts.push("emotions");
+  parts.push(...can.controls, ...Object.keys(can.categories));
+  if (can.emotions.length) parts.push("emotion");
   if (can.styles) parts.push("the style of a clip");
-  if (can.seed_clips) parts.push("continues a clip");
-  return `${can.title}. ${parts.length ? `It takes ${parts.join("; ")}.` : ""}`;
+  if (can.seed_clips) parts.push("a clip to continue");
+  return parts.length ? `You can choose ${parts.slice(0, -1).join(", ")}${parts.length > 1 ? " and " : ""}${parts.at(-1)}.` : "Gestures follow the speech alone.";
 }
 
 // What the folds hold, where they are closed.
@@ -81,7 +82,8 @@ function summaries() {
   const say = (id, text) => { find(id).querySelector(".summary").textContent = text; };
   say("controls-section", set.length ? set.join(", ") : "free");
   say("pins-section", state.pins.length ? `${state.pins.length}` : "none");
-  say("more", [...Object.keys(state.files), ...state.settings.keys()].join(", "));
+  say("character-section", state.files.character?.name || "none");
+  say("more", [...Object.keys(state.files).filter((name) => name !== "character"), ...state.settings.keys()].join(", "));
 }
 
 function fillSettings(settings) {

@@ -5,7 +5,7 @@ import { clock, duration, find, make, number, showError, tell } from "./dom.js";
 import { isShown, keepOnly, onShown, show, shownSamples, toggle } from "./player.js";
 
 const ENDED = ["done", "failed", "cancelled"];
-const NAMES = { bvh: "BVH", npz: "NPZ", glb: "GLB", mp4: "MP4", smplx: "SMPL-X" };
+const NAMES = { bvh: "BVH (Blender)", npz: "NPZ", glb: "GLB", mp4: "MP4 (film)", smplx: "SMPL-X" };
 const ZIPPED = ["bvh", "glb", "npz"];
 
 let about = null, takes = [], reuse = () => {}, mine = new Set(), waitingFilms = new Set(), first = true;
@@ -102,7 +102,7 @@ function makeCard(take) {
   const { job } = take;
   const count = take.count === 1 ? "1 sample" : `${take.count} samples`;
   const head = make("div", { class: "line head" },
-    make("b", {}, `Take ${take.number}`), make("span", { class: "soft about" }, `${take.system}, ${count} for ${take.speech.name}, seed ${take.request.seed}`), make("span", { class: "gap" }),
+    make("b", {}, `Take ${take.number}`), make("span", { class: "soft about" }, `${about.titles[take.system] || take.system}, ${count} for ${take.speech.name}, seed ${take.request.seed}`), make("span", { class: "gap" }),
     job.state === "done" && make("button", { type: "button", "data-key": `show-${take.id}`, onclick: () => showTake(take) }, "Show"),
     menu(take));
   const error = failed.get(take.id) || (job.state === "failed" ? job.error.message : "");
@@ -110,7 +110,8 @@ function makeCard(take) {
     !ENDED.includes(job.state) && progress(job, () => act(take, post(`api/takes/${take.id}/cancel`)), `cancel-${take.id}`),
     job.state === "cancelled" && make("p", { class: "soft" }, "Cancelled."),
     error && make("p", { class: "error", role: "alert" }, error),
-    take.subtitle && detail(take), take.samples && make("div", { class: "samples" }, sortedSamples(take).map((sample) => row(take, sample))), take.samples && foot(take));
+    take.warning && make("p", { class: "warning" }, take.warning),
+    take.samples && detail(take), take.samples && make("div", { class: "samples" }, sortedSamples(take).map((sample) => row(take, sample))), take.samples && foot(take));
 }
 
 function menu(take) {
@@ -124,8 +125,8 @@ function menu(take) {
 const close = (event) => { event.target.closest("details").open = false; };
 
 function detail(take) {
-  const lines = take.lines.filter((line) => line);
-  return lines.length > 0 && make("details", { class: "lines" }, make("summary", {}, make("span", { class: "soft" }, lines[0])), lines.slice(1).map((line) => make("p", { class: "soft" }, line)), make("code", {}, take.command));
+  const lines = take.lines.filter((line) => line), first = take.plain || lines[0];
+  return lines.length > 0 && make("details", { class: "lines" }, make("summary", { title: lines.join("\n") }, make("span", { class: "soft" }, first)), lines.slice(take.plain ? 0 : 1).map((line) => make("p", { class: "soft" }, line)), make("code", {}, take.command));
 }
 
 function progress(job, cancel, key) {
@@ -162,8 +163,9 @@ function wordsOf(job) {
 function row(take, sample) {
   const one = { take: take.id, sample: sample.number, speech: take.speech.id }, on = isShown(take.id, sample.number);
   const eye = make("button", { type: "button", class: "eye", "aria-pressed": String(on), "data-key": `eye-${take.id}-${sample.number}`, title: on ? "In the player; press to take it out" : "Press to see it in the player, beside the others", onclick: () => toggle(one) }, `sample ${sample.number}`);
-  const score = sample.score === null ? null : make("span", { class: "soft", title: "Score; higher is better" }, number(sample.score));
-  return make("div", { class: "sample" }, eye, stars(take, sample), score, make("span", { class: "gap" }), make("span", { class: "files" }, about.formats.map((format) => file(take, sample, format))), sample.note && make("p", { class: "note" }, sample.note));
+  const best = take.count > 1 && take.samples.every((other) => other.score <= sample.score);
+  const score = sample.score === null ? null : make("span", { class: best ? "score best" : "score", title: "How well the motion goes with the speech; higher is better" }, `${best ? "best:" : "score"} ${sample.score.toFixed(2)}`);
+  return make("div", { class: "sample" }, eye, stars(take, sample), score, make("span", { class: "gap" }), make("span", { class: "files" }, make("span", { class: "soft" }, "Download"), about.formats.map((format) => file(take, sample, format))), sample.note && make("p", { class: "note" }, sample.note));
 }
 
 function stars(take, sample) {

@@ -6,7 +6,7 @@ class Figure {
   constructor(data, positions, index) {
     Object.assign(this, data);
     this.index = index;
-    this.colour = PALETTE[index % PALETTE.length];
+    this.colour = PALETTE[(data.number ?? index) % PALETTE.length];
     this.positions = positions;
     this.data = null;
     this.pose = new Float32Array(3 * this.points);

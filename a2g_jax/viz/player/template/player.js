@@ -156,7 +156,7 @@ class Player {
     if (this.opened) { this.opened(true); this.opened = null; }
   }
 
-  // Slow machines get fewer pixels while playing.
+  // Slow machines show fewer pictures while playing, and below 12 a second get fewer pixels.
   adapt(stamp) {
     const took = stamp - (this.stamp || stamp);
     this.stamp = stamp;
@@ -164,7 +164,7 @@ class Player {
     if (took <= 0) return;
     this.slow = mix(this.slow || 16, Math.min(took, 400), 0.15);
     this.since += 1;
-    if (this.slow > 45 && this.since > 8 && this.renderer.scale > 0.52) { this.renderer.scale *= 0.85; this.since = 0; }
+    if (this.slow > 80 && this.since > 8 && this.renderer.scale > 0.52) { this.renderer.scale *= 0.85; this.since = 0; }
   }
 
   showClock() {
