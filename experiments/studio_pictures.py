@@ -50,7 +50,7 @@ def opened(browser: Any, url: str, size: tuple[int, int], dark: bool) -> Iterato
     )
     try:
         view.goto(url)
-        view.locator("#system-about", has_text="frames a second").wait_for(timeout=120_000)
+        view.locator("#system-about", has_text="You can choose").wait_for(timeout=120_000)
         yield view
     finally:
         view.close()

@@ -55,6 +55,7 @@ def test_every_table_has_the_rows_that_its_scores_are_read_against(corpus):
             assert rows[name][metric]["mean"] == pytest.approx(row[metric]["mean"] / 3, rel=1e-5, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_network_with_longer_clips_than_are_generated_is_refused(corpus):
     with pytest.raises(InputError, match="feature vectors are of 21 frames, and in clips of at most 20 there are 0"):
         nulls(Ruler(corpus, network(21), 3), PROTOCOL)

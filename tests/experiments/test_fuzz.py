@@ -78,6 +78,7 @@ def test_changes_are_those_of_the_seed():
     assert any(b'"checksum": null' in edit for edit in edits)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*fork.*")
 def test_a_short_campaign(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(command, "RESULTS", tmp_path)

@@ -131,7 +131,11 @@ def test_constant_channels_have_no_density_and_stay_at_their_mean():
         build(replace(CONFIG, least_std=9.0), DATA)
 
 
-@pytest.mark.parametrize("changes", [{}, {"predictor": False, "freedom": 0.0}], ids=["linear layer", "normal"])
+@pytest.mark.parametrize(
+    "changes",
+    [pytest.param({}, marks=pytest.mark.slow), {"predictor": False, "freedom": 0.0}],
+    ids=["linear layer", "normal"],
+)
 def test_removed_noise_is_the_gradient_of_the_log_density(x64, changes):
     config = replace(CONFIG, stride=1, history_frames=24, lookahead_frames=36, **changes)
     networks = FlowNetworks(config, DATA)

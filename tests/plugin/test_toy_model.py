@@ -74,6 +74,7 @@ def test_both_stages_are_trained_and_the_second_leaves_the_first_alone(toy_run):
         assert np.array_equal(now, then) == (path[0] != "spread"), path
 
 
+@pytest.mark.slow
 def test_resuming_after_sigkill_equals_not_having_stopped(toy_corpus, tmp_path):
     """Killed once in each stage."""
     folder, whole = tmp_path / "killed", tmp_path / "whole"
@@ -160,7 +161,7 @@ def test_the_commands_take_it(toy_run, toy_corpus, tmp_path, capsys):
     assert main(["generate", str(toy_run), "--settings"]) == 0
     assert "--amplitude 1.0" in capsys.readouterr().out
     assert main([*arguments, "--temperature", "2"]) == 2
-    assert "no setting --temperature" in capsys.readouterr().err
+    assert "there is no flag --temperature" in capsys.readouterr().err
     report = tmp_path / "report"
     assert (
         main(["evaluate", str(toy_run), "--corpus", str(toy_corpus.path), "--out", str(report), "--samples", "1"]) == 0

@@ -98,6 +98,7 @@ def slow_drawing(page, milliseconds):
     )
 
 
+@pytest.mark.slow
 def test_slow_drawing_takes_no_time_from_messages(browser, live):
     with page_of(browser, live.url) as page:
         slow_drawing(page, 400)
@@ -108,6 +109,7 @@ def test_slow_drawing_takes_no_time_from_messages(browser, live):
         assert page.evaluate("a2gLive.scale()") < 0.9
 
 
+@pytest.mark.slow
 def test_a_page_that_draws_too_slowly_says_so(browser, live):
     with page_of(browser, live.url) as page:
         slow_drawing(page, 2600)

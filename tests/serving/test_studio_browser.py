@@ -134,6 +134,7 @@ def test_speech_is_dropped_and_its_gestures_are_seen_ranked_and_downloaded(page,
     assert read_bvh(tmp_path / "sample.bvh").frames == 60
 
 
+@pytest.mark.slow
 def test_clips_curves_and_errors_beside_their_fields(page, talked):
     drop(page, talked / "wave.bvh")
     page.locator(".pin", has_text="wave.bvh").wait_for()

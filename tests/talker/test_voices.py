@@ -234,6 +234,7 @@ def test_the_same_arguments_give_the_same_bits_whatever_was_spoken_before():
     assert fast.annotations == first.annotations
 
 
+@pytest.mark.slow
 def test_emotions_act_as_in_the_invented_voice():
     needs_voices()
     found = {}
