@@ -424,6 +424,7 @@ def test_semantic_labels_are_weights_of_frames(corpus):
     assert scorer.sample(spoilt, target)["srgr"] < 0.9
 
 
+@pytest.mark.slow
 def test_emotions_are_judged_by_a_classifier_that_fits(corpus, tmp_path, capsys):
     small = dataclasses.replace(
         find_model("emotion_classifier").presets["tiny"], channels=(16, 16), hidden=8, clip_frames=50, input="motion"

@@ -226,6 +226,7 @@ def _planted(rng, informative):
     }
 
 
+@pytest.mark.slow
 def test_strokes_are_predicted_where_the_features_tell():
     rng = np.random.default_rng(0)
     for informative in (True, False):
@@ -250,6 +251,7 @@ def test_predictable_reads_a_recording():
     assert len(take["speeds"]) == len(take["sizes"]) == len(take["apexes"])
 
 
+@pytest.mark.slow
 def test_emotions_judged_shown_and_drawn(tmp_path):
     rng = np.random.default_rng(0)
     classes = emotions.LABELS["emotion"]

@@ -416,6 +416,7 @@ class TestObjective:
         assert moved == {"fusion", "encoder", "prompter", "decoder", "hold"}
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["vae"]))
 
+    @pytest.mark.slow
     def test_the_run_has_the_average_of_the_generator(self):
         """Over the last stage with a discriminator, from its beginning on."""
         config = replace(CONFIG, average_decay=0.75)
