@@ -108,51 +108,20 @@ def prepare_data_set(
     out: str | os.PathLike[str],
     features: Features,
     *,
-    seed: int = 0,
-    official: bool = True,
-    skip_broken: bool = False,
-    limit: int | None = None,
-    labels: str | os.PathLike[str] | None = None,
-    confidence: float | None = None,
-    labelled: bool = False,
     workers: int | None = None,
-    skeleton: Skeleton | None = None,
-    channel: int | None = None,
-    tier: str | None = None,
-    smooth: float | None = None,
+    **choices: Any,
 ) -> Corpus:
     """Write a corpus from recordings on disk, in any layout that :mod:`a2g_jax.data.datasets` reads.
 
     Args:
-        name: of the data set, as for :func:`~a2g_jax.data.datasets.find_data_set`.
-        source: its folder.
-        seed: of the split, where the data set has no official one.
-        official: use the official split.
-        skip_broken: leave out recordings that cannot be prepared, and note them in the manifest.
-        limit: largest number of recordings, spread evenly over all.
-        labels: table of emotions by window (:mod:`a2g_jax.data.emotion_table`); the corpus then has the pieces of
-            recordings in which an emotion is sure. Some data sets bring their own.
-        confidence: least probability of a window's emotion in the table; of the data set, or 0.9, if None.
-        labelled: leave out recordings without an emotion, and note them in the manifest.
+        name: see :func:`data_set_work`, as for ``source`` and ``choices``.
         workers: number of processes; one for every core if None.
-        skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
-        channel: of audio files with several, from 1 on; the mean of all if None.
-        tier: of TextGrids with several, or the speaker it is of; the first one of words if None.
-        smooth: frequency in Hz above which motions are filtered (:func:`~a2g_jax.geometry.smooth.smooth`); None: not.
 
     Raises:
         InputError: the folder exists, the source has another layout, or a recording cannot be prepared.
         Interrupted: by Ctrl-C; the same call resumes.
     """
-    choices: dict[str, Any] = {
-        "seed": seed,
-        "official": official,
-        "skip_broken": skip_broken,
-        "limit": limit,
-        "labels": labels,
-    }
-    choices |= {"confidence": confidence, "labelled": labelled, "skeleton": skeleton, "channel": channel}
-    return prepare_work(out, data_set_work(name, source, features, **choices, tier=tier, smooth=smooth), workers)
+    return prepare_work(out, data_set_work(name, source, features, **choices), workers)
 
 
 def data_set_work(
@@ -172,7 +141,27 @@ def data_set_work(
     tier: str | None = None,
     smooth: float | None = None,
 ) -> Work:
-    """The work of :func:`prepare_data_set`, recording by recording."""
+    """The work of :func:`prepare_data_set`, recording by recording.
+
+    Args:
+        name: of the data set, as for :func:`~a2g_jax.data.datasets.find_data_set`.
+        source: its folder.
+        seed: of the split, where the data set has no official one.
+        official: use the official split.
+        skip_broken: leave out recordings that cannot be prepared, and note them in the manifest.
+        limit: largest number of recordings, spread evenly over all.
+        labels: table of emotions by window (:mod:`a2g_jax.data.emotion_table`); the corpus then has the pieces of
+            recordings in which an emotion is sure. Some data sets bring their own.
+        confidence: least probability of a window's emotion in the table; of the data set, or 0.9, if None.
+        labelled: leave out recordings without an emotion, and note them in the manifest.
+        skeleton: the body to retarget every recording to, such as that of a run that is to be fine-tuned.
+        channel: of audio files with several, from 1 on; the mean of all if None.
+        tier: of TextGrids with several, or the speaker it is of; the first one of words if None.
+        smooth: frequency in Hz above which motions are filtered (:func:`~a2g_jax.geometry.smooth.smooth`); None: not.
+
+    Raises:
+        InputError: the source has another layout.
+    """
     reader, folder = find_data_set(name), Path(source)
     takes = reader.find(folder)
     if limit is not None and limit < len(takes):

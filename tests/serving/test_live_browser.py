@@ -1,42 +1,24 @@
 """The page with a microphone, in a Chromium whose microphone is a file."""
 
-import os
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from a2g_jax.io.audio import write_audio
-from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
+from tests.browser_for_tests import FAKE_MICROPHONE, chromium
 from tests.serving.live_for_tests import RATE, speech
 
 pytestmark = pytest.mark.browser
-FAKE = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream")
 
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    reason = None
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        reason = "playwright is not installed"
-    path = find_browser()
-    if path is None or not Path(path).exists():
-        reason = "no Chromium found; install it or set A2G_CHROMIUM"
-    if reason:
-        if os.environ.get("A2G_REQUIRE_BROWSER") == "1":
-            pytest.fail(reason)
-        pytest.skip(reason)
     wav = tmp_path_factory.mktemp("microphone") / "speech.wav"
     write_audio(wav, speech(3.0) / np.float32(32768), RATE)
-    arguments = [*BROWSER_ARGUMENTS, *FAKE, f"--use-file-for-fake-audio-capture={wav}"]
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=arguments)
+    with chromium(*FAKE_MICROPHONE, f"--use-file-for-fake-audio-capture={wav}") as opened:
         yield opened
-        opened.close()
 
 
 @contextmanager

@@ -1,8 +1,6 @@
 """The studio in Chromium with a shipped run: drop speech, generate, look, rank, download, and cancel."""
 
 import base64
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,12 +17,11 @@ from a2g_jax.io.bvh import read_bvh, write_bvh
 from a2g_jax.serving.run import served
 from a2g_jax.serving.studio.routes import studio_app
 from a2g_jax.talker.recordings import talk
-from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
+from tests.browser_for_tests import FAKE_MICROPHONE, chromium
 
 pytestmark = pytest.mark.browser
 
 SECONDS = 2.0
-_MICROPHONE = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream")
 _DROP = """([name, data]) => {
   const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0)), transfer = new DataTransfer();
   transfer.items.add(new File([bytes], name));
@@ -34,22 +31,8 @@ _DROP = """([name, data]) => {
 
 @pytest.fixture(scope="module")
 def browser():
-    reason = None
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        reason = "playwright is not installed"
-    path = find_browser()
-    if path is None or not Path(path).exists():
-        reason = "no Chromium found; install it or set A2G_CHROMIUM"
-    if reason:
-        if os.environ.get("A2G_REQUIRE_BROWSER") == "1":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=[*BROWSER_ARGUMENTS, *_MICROPHONE])
+    with chromium(*FAKE_MICROPHONE) as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")

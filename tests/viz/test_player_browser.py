@@ -1,9 +1,7 @@
 import io
-import os
 import subprocess
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from PIL import Image
 from a2g_jax.errors import InputError
 from a2g_jax.recording import Word
 from a2g_jax.viz.player import Figure, Track, screenshot_page, write_page
-from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
+from tests.browser_for_tests import chromium
 from tests.viz.figures_for_tests import tone, waving
 
 pytestmark = pytest.mark.browser
@@ -20,22 +18,8 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture(scope="module")
 def browser():
-    reason = None
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        reason = "playwright is not installed"
-    path = find_browser()
-    if path is None or not Path(path).exists():
-        reason = "no Chromium found; install it or set A2G_CHROMIUM"
-    if reason:
-        if os.environ.get("A2G_REQUIRE_BROWSER") == "1":
-            pytest.fail(reason)
-        pytest.skip(reason)
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=list(BROWSER_ARGUMENTS))
+    with chromium() as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
