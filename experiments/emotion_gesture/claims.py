@@ -172,7 +172,7 @@ def smooth_loss() -> list[str]:
 def seam() -> list[str]:
     """Prompts beat padding where the given poses end."""
     rows = (*table4.VARIANTS, HELD, MEAN)
-    lines = _claims(table4, ["the speed", "the jerk", "(tiny)"])
+    lines = _claims(table4, ["the speed", "the jerk"])
     return [
         *lines,
         *(

@@ -1,9 +1,10 @@
 """Rows that several tables share, and how they are trained.
 
-Rows of the paper have its parts at the size of the preset ``tiny``, with what small trainings need: poses as z-scores,
-the weight of the reconstruction that belongs to them, scaled products in the prompter (as printed its sigmoids begin
-saturated) and a position encoding of the decoder's queries (without one, zeros are the same query at every frame). What
-else ``tiny`` has is its own row.
+Rows of the paper have its parts at the size of the preset ``tiny``, with what small trainings need to leave the mean
+pose: poses as z-scores, the weight of the reconstruction that belongs to them, scaled products in the prompter (as
+printed its sigmoids begin saturated), a position encoding and the audio in the decoder's queries, the last initial pose
+added to the output, a discriminator of patches, and features that are trained first. What else ``tiny`` has, above all
+emotions exchanged between clips, is its own row.
 """
 
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ _KEPT = (
     *("clip_frames", "seed_frames", "transition_frames", "vae_latent", "vae_channels", "vae_kl_weight"),
     *("normalise_pose", "scaled_scores", "query_positions", "reconstruction_weight", "adversarial_weight"),
     *("smooth_weight", "beat_weight", "emotion_weight", "vae_steps"),
+    *("query_audio", "hold_seed", "smoothing", "discriminator", "mismatched", "mining_steps"),
 )
 #: The paper's method at the size of ``tiny``, as changes of that preset; seams as the paper leaves them.
 BASE: dict[str, Any] = {

@@ -19,7 +19,7 @@ from experiments.tables.runs import Ruler, Setting, Variant, arguments, measure,
 #: Name of :func:`continued` in records.
 SCORED = "continued clips"
 #: Training steps of the committed records.
-STEPS = 600
+STEPS = 400
 
 
 @dataclass(frozen=True)

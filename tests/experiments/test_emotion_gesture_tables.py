@@ -69,11 +69,11 @@ def test_the_ladder_has_the_papers_parts_one_after_another():
         for one, other in zip(rows, rows[1:], strict=False)
     ]
     parts = ["branches", "branches", "emotion_weight", "beat_weight", "prompter", "prompter", "smooth_weight"]
-    assert [one - {"vae_steps"} for one in changed] == [{part} for part in parts]
+    assert [one - {"vae_steps", "mining_steps"} for one in changed] == [{part} for part in parts]
     full, default = rows[-1], EmotionGestureConfig()
     assert full.prompter == "spatial-temporal"
     assert min(full.beat_weight, full.emotion_weight, full.smooth_weight, full.vae_steps) > 0
-    for name in ("emotion_span", "beat_normalised", "hold_seed", "smoothing", "discriminator", "exchange", "beat_form"):
+    for name in ("emotion_span", "beat_normalised", "exchange", "beat_form"):
         assert getattr(full, name) == getattr(default, name)
         assert name in BASE
     assert (full.channels, full.reconstruction_weight) == (TINY.channels, TINY.reconstruction_weight)
