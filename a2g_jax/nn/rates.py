@@ -59,6 +59,39 @@ def smoothed(x: Float[Array, "B T C"], passes: int) -> Float[Array, "B T C"]:
     return x
 
 
+#: Filters before changes are measured, and over the weights that come from them.
+_CHANGE_PASSES, _WEIGHT_PASSES = 1, 2
+#: A filter that removes what alternates from frame to frame and keeps 98 % of what repeats every eight frames.
+_FLAT = (-1 / 16, 4 / 16, 10 / 16, 4 / 16, -1 / 16)
+
+
+def adaptively_smoothed(
+    x: Float[Array, "B T C"], passes: int, speed: float | Float[np.ndarray, " C"]
+) -> Float[Array, "B T C"]:
+    """The sequence, smoothed by ``passes`` binomial filters where a value hardly changes and less the faster it does.
+
+    The output is s + g (q - s) with the smoothed sequence s, the sequence q without what alternates from frame to
+    frame, and g = v^2 / (v^2 + speed^2), where v is the change in a frame. Like the 1 euro filter (Casiez et al., CHI
+    2012), whose cutoff rises with speed, but without delay: frames on both sides count, :func:`adaptive_reach` of them.
+
+    Args:
+        speed: change in a frame at which both count half, for all channels or for each one.
+    """
+    around = jnp.pad(smoothed(x, _CHANGE_PASSES), ((0, 0), (1, 1), (0, 0)), mode="edge")
+    change = smoothed(jnp.abs(around[:, 2:] - around[:, :-2]) / 2.0, _WEIGHT_PASSES)
+    half = jnp.square(jnp.broadcast_to(speed, x.shape[-1:]))[None, None]
+    quick = jnp.square(change) / (jnp.square(change) + half)
+    slow, side = smoothed(x, passes), len(_FLAT) // 2
+    around = jnp.pad(x, ((0, 0), (side, side), (0, 0)), mode="edge")
+    flat = sum(weight * around[:, place : place + x.shape[1]] for place, weight in enumerate(_FLAT))
+    return slow + quick * (flat - slow)
+
+
+def adaptive_reach(passes: int) -> int:
+    """Frames on either side that a frame of :func:`adaptively_smoothed` depends on."""
+    return max(passes, _CHANGE_PASSES + 1 + _WEIGHT_PASSES)
+
+
 def shifted(x: Float[Array, "B T C"], frames: Int[Array, " B"] | None) -> Float[Array, "B T C"]:
     """Each sequence delayed by a number of frames of its own, its first or last frame repeated; as it is for None."""
     if frames is None:

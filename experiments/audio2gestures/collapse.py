@@ -131,7 +131,10 @@ def main() -> None:
             adversarial = options.steps // 3
             first = options.steps - adversarial
             where = Setting(options.corpora / poses, None, options.runs, first, _SAMPLES, (seed,), 1e9)
-            variant = Variant({"backbone": backbone, "adversarial_steps": adversarial}, training={"batch_size": 4})
+            variant = Variant(
+                {"backbone": backbone, "adversarial_steps": adversarial, "rest_smoothing": 0},
+                training={"batch_size": 4},
+            )
             digest, config = described("run", variant, {}, seed, corpus, where)
             key: dict[str, Any] = {"variant": f"{poses}, {backbone}", "seed": seed, "steps": options.steps}
             key |= {"poses": poses, "backbone": backbone, "corpus": name_of(corpus), "settings": digest}

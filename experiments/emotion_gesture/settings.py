@@ -59,17 +59,18 @@ def paper(**changes: Any) -> Variant:
 
 
 def scaled(variants: Mapping[str, Variant], steps: int) -> dict[str, Variant]:
-    """Rows whose further stages have the same share of a table's steps as of the preset's.
+    """Rows whose further stages have the same share of a row's steps as of the preset's.
 
-    The VAE is small and keeps its steps, up to the table's.
+    The VAE is small and keeps its steps, up to the row's.
     """
     return {name: _scaled(variant, steps) if variant.model == MODEL else variant for name, variant in variants.items()}
 
 
 def _scaled(variant: Variant, steps: int) -> Variant:
     own = {name: variant.changes.get(name, getattr(TINY, name)) for name in (*_STAGES, "vae_steps")}
+    main = round(steps * variant.steps)
     found = {
-        name: min(own[name], steps) if name == "vae_steps" else round(own[name] * steps / PRESET_STEPS) for name in own
+        name: min(own[name], main) if name == "vae_steps" else round(own[name] * main / PRESET_STEPS) for name in own
     }
     return replace(variant, changes={**variant.changes, **found})
 

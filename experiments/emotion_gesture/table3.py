@@ -8,7 +8,7 @@ Without a corpus the table is rendered from the existing records.
 from dataclasses import replace
 
 from experiments.emotion_gesture.settings import FULL, PRESET_STEPS, SAMPLED, TINY, ours, paper
-from experiments.emotion_gesture.table import Table, command
+from experiments.emotion_gesture.table import STEPS, Table, command
 from experiments.tables.claims import Claim
 
 BASELINE, LABEL, EAD = "baseline", "baseline with one-hot label", "+ EAD"
@@ -16,6 +16,8 @@ EMO, BEAT, SPATIAL, TEMPORAL = "+ L_emo", "+ L_beat", "+ spatial", "+ temporal"
 SMOOTH, SAMPLING = "+ L_smooth", "+ sampling"
 OURS, OURS_SAMPLING, OURS_LABEL = "tiny", "tiny with sampling", "tiny with one-hot label"
 
+#: Steps of the whole preset, in those of the table: emotions are shown on request only after that many.
+WHOLE = PRESET_STEPS / STEPS
 #: Without losses of features there is no stage that trains them first.
 _NONE = {
     **{"prompter": "predictor", "emotion_weight": 0.0, "beat_weight": 0.0, "smooth_weight": 0.0},
@@ -34,10 +36,10 @@ VARIANTS = {
     TEMPORAL: paper(smooth_weight=0.0),
     SMOOTH: FULL,
     SAMPLING: ours(SMOOTH, SAMPLED, **FULL.changes),
-    OURS: ours(),
+    OURS: replace(ours(), steps=WHOLE),
     OURS_SAMPLING: ours(OURS, SAMPLED),
     # As many steps of motion in one stage, since sampled features have a stage of their own.
-    OURS_LABEL: replace(ours(branches="label"), steps=1.0 + getattr(TINY, "sampled_steps", 0) / PRESET_STEPS),
+    OURS_LABEL: replace(ours(branches="label"), steps=WHOLE * (1.0 + TINY.sampled_steps / PRESET_STEPS)),
 }
 
 CLAIMS = (
@@ -94,8 +96,8 @@ TABLE = Table(
     (
         "Rows up to '+ sampling' have the paper's parts and losses at the size of the preset `tiny`, with what small"
         " trainings need (`experiments/emotion_gesture/settings.py`): without it, rows of so few steps stay at the mean"
-        " pose. The last three are that preset, without and with sampled emotion features, and with a one-hot label in"
-        " place of emotion-beat mining.",
+        " pose. The last three are that preset with all its steps, without and with sampled emotion features, and with"
+        " a one-hot label in place of emotion-beat mining.",
         "The one-hot rows are given the true emotion of the speech; all others find it in the audio.",
     ),
 )

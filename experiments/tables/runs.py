@@ -310,6 +310,8 @@ def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | N
         for name, value in values.pop("sampling").items()
         if name not in ("keep_shared", "keep_specific", "control_gains")
     }
+    if not sampling.get("rest_smoothing"):
+        sampling = {name: value for name, value in sampling.items() if name not in ("rest_smoothing", "rest_speed")}
     if "style_controls" not in values["model_config"]:
         sampling.pop("control_curves", None)
     values["model_config"] |= sampling

@@ -232,9 +232,10 @@ def test_stages_are_scaled_with_the_steps_of_a_table():
         for setting in variant.changes:
             if setting.endswith("_steps") and setting != "vae_steps":
                 own = getattr(settings_of(table3.VARIANTS[name], table3.VARIANTS), setting)
-                assert variant.changes[setting] == own or variant.trained_as
+                assert variant.changes[setting] == own * variant.steps or variant.trained_as
                 assert half[name].changes[setting] == pytest.approx(variant.changes[setting] / 2, abs=0.5)
-    assert scaled(table3.VARIANTS, 5)[table3.OURS].changes["vae_steps"] == 5
+    assert scaled(table3.VARIANTS, 5)[table3.OURS].changes["vae_steps"] == 5 * table3.WHOLE
+    assert scaled(table3.VARIANTS, 400)[table3.OURS].changes["sampled_steps"] == TINY.sampled_steps
     assert full[table3.BASELINE].changes["vae_steps"] == 0
     others = {name: variant for name, variant in table2.VARIANTS.items() if variant.model != "emotion_gesture"}
     assert {name: scaled(table2.VARIANTS, 5)[name] for name in others} == others

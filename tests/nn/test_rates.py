@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from a2g_jax.nn.rates import interpolated, pooled, shifted, smoothed
+from a2g_jax.nn.rates import adaptive_reach, adaptively_smoothed, interpolated, pooled, shifted, smoothed
 
 
 @settings(max_examples=20, deadline=None)
@@ -58,3 +58,37 @@ def test_each_sequence_is_delayed_by_its_own_number_of_frames():
     np.testing.assert_array_equal(same, range(6))
     np.testing.assert_array_equal(early, [3, 4, 5, 5, 5, 5])
     assert shifted(x, None) is x
+
+
+def test_adaptive_smoothing_smooths_what_is_slow_and_keeps_what_is_fast():
+    alternating = jnp.asarray(np.tile([0.01, -0.01], 30)[None, :, None], jnp.float32)
+    wave = np.sin(2 * np.pi / 8 * np.arange(60))[None, :, None]
+    slight, swing = (jnp.asarray(scale * wave, jnp.float32) for scale in (0.01, 10.0))
+    inner = slice(8, -8)
+    # What alternates vanishes at any speed, and what repeats every eight frames only where it is slow.
+    for speed in (1.0, 1e-6):
+        assert np.abs(adaptively_smoothed(alternating, 4, speed)[0, inner]).max() < 1e-4
+    kept = np.asarray(adaptively_smoothed(slight, 4, 1.0))[0, inner]
+    np.testing.assert_allclose(kept, np.cos(np.pi / 8) ** 8 * np.asarray(slight)[0, inner], atol=1e-5)
+    fast = np.asarray(adaptively_smoothed(swing, 4, 0.1))[0, inner]
+    np.testing.assert_allclose(fast, np.asarray(swing)[0, inner], rtol=0.03, atol=0.05)
+    # Each channel has a weight of its own, and its own speed.
+    both = jnp.concatenate([slight, swing], axis=-1)
+    again = np.asarray(adaptively_smoothed(both, 4, np.array([1.0, 0.1], np.float32)))[0, inner]
+    np.testing.assert_allclose(again, np.concatenate([kept, fast], axis=-1), atol=1e-6)
+
+
+@pytest.mark.parametrize("passes", [1, 4, 6])
+def test_adaptive_smoothing_reaches_as_far_as_stated(passes):
+    x = np.random.default_rng(0).standard_normal((1, 41, 2)).astype(np.float32)
+    moved = x.copy()
+    moved[0, 20] += 5.0
+    apart = np.abs(
+        np.asarray(
+            adaptively_smoothed(jnp.asarray(moved), passes, 0.5) - adaptively_smoothed(jnp.asarray(x), passes, 0.5)
+        )
+    )
+    rows = np.flatnonzero(apart[0].max(axis=-1) > 0)
+    assert rows.min() >= 20 - adaptive_reach(passes)
+    assert rows.max() <= 20 + adaptive_reach(passes)
+    assert rows.max() - 20 == adaptive_reach(passes)  # and no less

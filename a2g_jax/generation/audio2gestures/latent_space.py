@@ -96,7 +96,9 @@ class LatentSpace:
 
         self._draw, self._encode = jax.jit(draw), jax.jit(encode)
         self._write, self._space = space.from_rotations, space
-        self._decode = jax.jit(lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None])[0]))
+        self._decode = jax.jit(
+            lambda params, s, i: space.rotations(codec.decode(params, s[None], i[None], sampling=plain)[0])
+        )
 
     def from_audio(self, audio: Any, seed: int = 0, sample: int = 0, *, sample_rate: int | None = None) -> Codes:
         """S_A of speech and a drawn I_R: those of ``a2g generate --seed`` for this sample number.

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import linen as nn
 from jaxtyping import Array, Float, Key
 
@@ -14,8 +15,9 @@ from a2g_jax.features.dct import block_idct
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.networks import AudioEncoder, Decoder, Gaussian, MappingNet, MotionEncoder
 from a2g_jax.models.audio2gestures.reductions import Reductions, make_reductions
+from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Data, Params
-from a2g_jax.nn.rates import interpolated
+from a2g_jax.nn.rates import adaptively_smoothed, interpolated, smoothed
 
 #: Standard deviation of the authors' initial weights.
 _NORMAL_STD = 0.01
@@ -85,14 +87,27 @@ class Codec:
         shared: Float[Array, "B T C"],
         specific: Float[Array, "B T C"] | None,
         dropout_key: Key[Array, ""] | None = None,
+        sampling: Audio2GesturesSampling | None = None,
     ) -> Float[Array, "B T R D"]:
         """Poses of a full code in time: 6D vectors before Gram-Schmidt, or the values of another kind of pose.
 
         Exponential maps are not wrapped: those of a corpus are at most pi long, and no joint turns that far in speech.
+
+        Args:
+            sampling: settings of generation, which may smooth otherwise than training does.
         """
         flat = _apply(self.modules[2], params["decoder"], dropout_key, shared, specific)
+        flat = self._smoothed(flat, sampling)
         pose = flat.reshape(*flat.shape[:2], *self.data.pose_statistics.mean.shape)
         return self.data.pose_statistics.denormalise(pose) if self.normalises else pose
+
+    def _smoothed(self, flat: Float[Array, "B T C"], sampling: Audio2GesturesSampling | None) -> Float[Array, "B T C"]:
+        """Output of the decoder smoothed as in training, or by the settings of generation."""
+        if sampling is None or sampling.rest_smoothing == 0:
+            return smoothed(flat, self.config.smoothing)
+        speed = sampling.rest_speed / self.data.fps
+        unit = 1.0 if self.normalises else np.asarray(self.data.pose_statistics.std, np.float32).reshape(-1)
+        return adaptively_smoothed(flat, sampling.rest_smoothing, speed * unit)
 
     def map_noise(self, params: Params, noise: Float[Array, "B T C"]) -> Gaussian:
         """The random specific code I_R, mapped from noise in time."""

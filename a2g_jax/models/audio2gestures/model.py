@@ -29,6 +29,7 @@ from a2g_jax.models.audio2gestures.stored import (
 from a2g_jax.models.base import Condition, Controls, Data, Model, Params, Stage, Summary, Update
 from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.nn.noise import blended_draws, frame_normal
+from a2g_jax.nn.rates import adaptive_reach
 from a2g_jax.nn.tcn import receptive_halo
 
 #: Frames of context on either side for a GRU, whose memory is unbounded but fades.
@@ -95,7 +96,7 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
     ) -> Float[Array, "T R D"]:
         """The motion g(S_A, I_R) for the output of :func:`condition`."""
         codes = draw_codes(codec, sampling, params, summary, key, given.shared, start, given.request)
-        return codec.decode(params, *codes)[0]
+        return codec.decode(params, *codes, sampling=sampling)[0]
 
     def reconstruct(params: Params, batch: Batch) -> Float[Array, "B T R D"]:
         """The motion g(S_M, I_M) of mean codes."""
@@ -117,7 +118,7 @@ def build(config: Audio2GesturesConfig, data: Data, sampling: Audio2GesturesSamp
         "audio2gestures",
         config,
         config.clip_frames,
-        _halo(config),
+        _halo(config, sampling),
         init,
         tuple(stages),
         summarise,
@@ -236,7 +237,7 @@ def _draw(codec, sampling, params, summary, key, shared, start, requested):
     return audio_code, codec.specific_to_frames(specific)
 
 
-def _halo(config: Audio2GesturesConfig) -> int:
+def _halo(config: Audio2GesturesConfig, sampling: Audio2GesturesSampling) -> int:
     """Frames on either side that an output frame depends on; for the GRU, those with a noticeable effect."""
     if config.latent == "dct":
         reach = config.dct_points - 1
@@ -250,8 +251,10 @@ def _halo(config: Audio2GesturesConfig) -> int:
         # The mapping net works in time before its bands are taken.
         mapping = config.dct_points - 1 + MAPPING_LAYERS * (config.kernel_size // 2)
     else:
-        mapping = MAPPING_LAYERS * (config.kernel_size // 2)
+        # Stored codes take none.
+        mapping = 0 if config.stored_codes else MAPPING_LAYERS * (config.kernel_size // 2)
     # Interpolation takes one more step.
     mapping = (mapping + 1) * config.specific_frames if config.specific_frames > 1 else mapping
     # The decoder takes codes from an encoder or from the mapping net; the one that reaches farther counts.
-    return max(reach, mapping) + receptive_halo(len(config.decoder_channels), config.kernel_size) + config.smoothing
+    filters = config.smoothing if sampling.rest_smoothing == 0 else adaptive_reach(sampling.rest_smoothing)
+    return max(reach, mapping) + receptive_halo(len(config.decoder_channels), config.kernel_size) + filters

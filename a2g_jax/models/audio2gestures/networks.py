@@ -12,7 +12,7 @@ from a2g_jax.features.dct import block_dct
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.nn.attention import Transformer
 from a2g_jax.nn.conv import Conv1D, Dense
-from a2g_jax.nn.rates import pooled, smoothed
+from a2g_jax.nn.rates import pooled
 from a2g_jax.nn.recurrent import GRU
 from a2g_jax.nn.tcn import TCN
 
@@ -150,7 +150,7 @@ class MotionEncoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """g: both codes, in time, to motion."""
+    """g: both codes, in time, to motion, not smoothed yet."""
 
     config: Audio2GesturesConfig
     features: int
@@ -165,7 +165,7 @@ class Decoder(nn.Module):
         c = self.config
         x = shared if specific is None else jnp.concatenate([shared, specific], axis=-1)
         x = TCN(c.decoder_channels, c.kernel_size, c.dropout)(x, deterministic)
-        return smoothed(Dense(self.features)(nn.relu(Dense(c.decoder_channels[-1])(x))), c.smoothing)
+        return Dense(self.features)(nn.relu(Dense(c.decoder_channels[-1])(x)))
 
 
 class MappingNet(nn.Module):

@@ -26,6 +26,11 @@ class Audio2GesturesSampling:
     """Lowest DCT bands of the shared code that are kept, before other edits; all if not set."""
     keep_specific: int | None = None
     """Lowest DCT bands of the specific code that are kept, before other edits; all if not set."""
+    rest_smoothing: int = 0
+    """Binomial filters over values that hardly change, fewer the faster they do; hands then come to rest and strokes
+    stay quick. 0 smooths all frames alike, as in training."""
+    rest_speed: float = 2.4
+    """Speed of a value at which half of that smoothing is left, in standard deviations of training motion a second."""
     edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
     """Edits of the codes' DCT bands, such as 'specific scale 0:10 1.5', or a name: calmer, livelier, smaller, larger,
     smoother, 'slower sway', 'one posture', 'without speech'; may be repeated."""
@@ -43,6 +48,10 @@ class Audio2GesturesSampling:
         """Refuse values out of range."""
         if self.redraw_frames < 0:
             raise InputError(f"--redraw-frames: expected 0 or more; got {self.redraw_frames}.")
+        if self.rest_smoothing < 0:
+            raise InputError(f"--rest-smoothing: expected 0 or more; got {self.rest_smoothing}.")
+        if not 0 < self.rest_speed < float("inf"):
+            raise InputError(f"--rest-speed: expected a number above 0; got {self.rest_speed}.")
         if not 0 <= self.noise_scale < float("inf"):
             raise InputError(f"--noise-scale: expected 0 or more; got {self.noise_scale}.")
         for name in ("keep_shared", "keep_specific"):
@@ -63,6 +72,6 @@ class Audio2GesturesSampling:
 
 #: Sampling settings by preset; the papers' for presets that are missing.
 SAMPLING_PRESETS: dict[str, Audio2GesturesSampling] = {
-    "tiny": Audio2GesturesSampling(redraw_frames=512, sample_codes=False),
+    "tiny": Audio2GesturesSampling(redraw_frames=512, sample_codes=False, rest_smoothing=4),
 }
 """Without gains of controls, which are measured for each run: ``python -m experiments.controls RUN --store``."""
