@@ -30,6 +30,7 @@ from a2g_jax.nn.flow.invertible import (
     weight,
 )
 from a2g_jax.nn.flow.priors import log_prob, spread
+from tests.arrays_for_tests import on_device
 
 KEY = jax.random.key(0)
 CELLS = ("gru", "lstm")
@@ -54,7 +55,7 @@ def initial(shape, steps):
 def clips(shape, count=2, frames=9, seed=1):
     random = np.random.default_rng(seed)
     sizes = (shape.channels, shape.history, shape.condition)
-    return tuple(jnp.asarray(random.normal(size=(count, frames, size)), jnp.float32) for size in sizes)
+    return tuple(on_device(random.normal(size=(count, frames, size)), jnp.float32) for size in sizes)
 
 
 def trained(params, scale=0.3, seed=2):
@@ -64,7 +65,7 @@ def trained(params, scale=0.3, seed=2):
     def moved(path, leaf):
         fixed = any(getattr(part, "key", None) in FIXED for part in path)
         leaf = np.asarray(leaf)
-        return jnp.asarray(leaf if fixed else leaf + (scale * random.normal(size=leaf.shape)).astype(leaf.dtype))
+        return on_device(leaf if fixed else leaf + (scale * random.normal(size=leaf.shape)).astype(leaf.dtype))
 
     return jax.tree_util.tree_map_with_path(moved, params)
 
@@ -76,7 +77,7 @@ def double():
 
 
 def as_double(tree):
-    return jax.tree.map(lambda a: jnp.asarray(np.asarray(a, np.float64)), tree)
+    return jax.tree.map(lambda a: on_device(np.asarray(a, np.float64)), tree)
 
 
 class TestActnorm:
@@ -235,15 +236,15 @@ class TestPriors:
     def test_student_is_scipys(self):
         z = np.random.default_rng(0).normal(size=(6, 4))
         expected = stats.multivariate_t(np.zeros(4), np.eye(4), df=7).logpdf(z)
-        np.testing.assert_allclose(log_prob(jnp.asarray(z), 7.0), expected, rtol=1e-4)
+        np.testing.assert_allclose(log_prob(on_device(z), 7.0), expected, rtol=1e-4)
 
     def test_normal_is_scipys(self):
         z = np.random.default_rng(0).normal(size=(6, 4))
         expected = stats.multivariate_normal(np.zeros(4)).logpdf(z)
-        np.testing.assert_allclose(log_prob(jnp.asarray(z)), expected, rtol=1e-4)
+        np.testing.assert_allclose(log_prob(on_device(z)), expected, rtol=1e-4)
 
     def test_draws_of_student_have_its_radius(self):
-        normal = jnp.asarray(np.random.default_rng(0).normal(size=(20000, 3)), jnp.float32)
+        normal = on_device(np.random.default_rng(0).normal(size=(20000, 3)), jnp.float32)
         z = jax.jit(spread, static_argnums=2)(normal, jax.random.key(1), 5.0)
         # |z|^2 / C is F-distributed.
         assert stats.kstest(np.sum(np.square(np.asarray(z)), axis=-1) / 3, stats.f(3, 5).cdf).pvalue > 0.01
