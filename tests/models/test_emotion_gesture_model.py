@@ -93,7 +93,9 @@ class TestSize:
         assert 1.2e6 < size(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0))) < 2e6
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "raw" else name for name in VARIANTS]
+)
 def test_a_sample_does_not_depend_on_the_others_of_its_batch(name):
     config = VARIANTS[name]
     networks = Networks(config, make_data())
