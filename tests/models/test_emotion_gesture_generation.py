@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import cache
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_data, make_params
@@ -110,16 +109,17 @@ def continued(earlier, last, new, frames):
 def test_a_seam_has_no_step_of_place_or_speed():
     """A chunk that jumps away from the poses before it; and one that goes on as they do is left as it is."""
     time = np.arange(40)[:, None] / 15.0
-    whole = jnp.asarray(np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1), jnp.float32)
+    whole = np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1).astype(np.float32)
+    joining = jax.jit(seam, static_argnums=2)
     seed, jumped = whole[:10], whole[10:] + 0.5
     steps = lambda new: np.abs(np.diff(np.concatenate([seed, new]), 2, axis=0))  # noqa: E731
     assert steps(jumped)[8:10].max() > 0.4
-    joined = jumped + seam(seed, jumped, 10)
+    joined = jumped + np.asarray(joining(seed, jumped, 10))
     assert steps(joined).max() < 0.05
     np.testing.assert_allclose(joined[10:], jumped[10:], atol=1e-6)
-    assert np.abs(seam(seed, whole[10:], 10)).max() < 0.08
-    line = jnp.arange(12.0)[:, None]
-    np.testing.assert_allclose(seam(line[:4], line[4:], 5), 0.0, atol=1e-6)
+    assert np.abs(joining(seed, whole[10:], 10)).max() < 0.08
+    line = np.arange(12, dtype=np.float32)[:, None]
+    np.testing.assert_allclose(joining(line[:4], line[4:], 5), 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("sampling", [EmotionGestureSampling(seam_frames=0), PLAIN], ids=lambda s: s.seam_frames)
@@ -133,15 +133,15 @@ def test_it_is_the_chunks_one_after_another(audio, sampling):
     padded = np.concatenate([silence(first), audio, silence(chunk)])
     space, statistics = run.config.space, run.config.statistics["pose"]
     last, made = seeds[-first:], []
-    reconstruct = jax.jit(run.config.build().reconstruct)
+    reconstruct, valid = jax.jit(run.config.build().reconstruct), jax.jit(space.valid)
     for start in range(0, FRAMES, chunk):
         poses = np.concatenate([last, np.zeros((chunk, JOINTS, 6), np.float32)])
-        batch = Batch(jnp.asarray(padded[start : start + CHUNKS.clip_frames][None]), jnp.asarray(poses[None]))
+        batch = Batch(padded[start : start + CHUNKS.clip_frames][None], poses[None])
         found = statistics.normalise(np.asarray(reconstruct(run.params, batch))[0])
         seed, new = statistics.normalise(last), found[first:].copy()
         if fading:
             new = continued(seed[-2], seed[-1], new, fading)
-        new = np.asarray(space.valid(jnp.asarray(statistics.denormalise(new), jnp.float32)))
+        new = np.asarray(valid(np.float32(statistics.denormalise(new))))
         last = np.concatenate([last, new])[-first:]
         made.append(new)
     np.testing.assert_allclose(ours, np.concatenate(made)[:FRAMES], atol=2e-4)
