@@ -1,4 +1,6 @@
-"""The smallest model that tests train."""
+"""The smallest model that tests train, and initial parameters of runs."""
+
+import jax
 
 #: Settings that make Audio2Gestures train in a second a hundred steps.
 TOY_MODEL = {
@@ -14,3 +16,8 @@ TOY_MODEL = {
     "stored_codes": False,
     "adversarial_steps": 0,
 }
+
+
+def initial(config, seed=0):
+    """Initial parameters of a run's model on the host, by one program; operation by operation they take seconds."""
+    return jax.device_get(jax.jit(config.build().init)(jax.random.key(seed)))

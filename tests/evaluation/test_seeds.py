@@ -3,7 +3,6 @@
 import copy
 import dataclasses
 
-import jax
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from a2g_jax.evaluation.report import merge
 from a2g_jax.evaluation.seeds import describe_run, group_seeds, single_rows
 from a2g_jax.training.run import Run, load_run, save_run
 from a2g_jax.training.run_config import Source
+from tests.toy_model_for_tests import initial
 
 
 def row(name, seed, mean, settings="s", weights=None, **cell):
@@ -29,7 +29,7 @@ def baseline(name="truth"):
 
 def test_only_the_seed_may_differ(toy_run_config):
     config = toy_run_config()
-    params = config.build().init(jax.random.key(0))
+    params = initial(config)
 
     def settings(steps=12, **changes):
         trained = {key: changes.pop(key) for key in ("seed", "batch_size", "patience") if key in changes}
@@ -59,11 +59,11 @@ def test_the_hash_is_that_of_the_file(toy_run_config, tmp_path):
     import hashlib
 
     config = toy_run_config()
-    run = Run(config, config.build().init(jax.random.key(0)), {}, 3)
+    run = Run(config, initial(config), {}, 3)
     save_run(tmp_path, run)
     digest = hashlib.sha256((tmp_path / "weights.safetensors").read_bytes()).hexdigest()
     assert describe_run(run)["weights"] == describe_run(load_run(tmp_path))["weights"] == digest
-    assert describe_run(Run(config, config.build().init(jax.random.key(1)), {}, 3))["weights"] != digest
+    assert describe_run(Run(config, initial(config, 1), {}, 3))["weights"] != digest
 
 
 def test_the_interval_is_students_over_seeds():

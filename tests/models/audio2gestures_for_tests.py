@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -14,6 +13,7 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures.config import PRESETS
 from a2g_jax.models.audio2gestures.model import build
 from a2g_jax.models.base import Data
+from tests.arrays_for_tests import on_device
 
 #: Codes at the rate of the motion with the papers' mapping net, and their losses on random codes.
 MAPPING = {
@@ -65,7 +65,7 @@ def make_batch(dtype=np.float32, clips=2, frames=6):
     random = np.random.default_rng(2)
     turns = Rotation.random(clips * frames * JOINTS, rng=random).as_matrix()
     pose = np.concatenate([turns[:, :, 0], turns[:, :, 1]], axis=1).reshape(clips, frames, JOINTS, 6)
-    return Batch(jnp.asarray(random.normal(size=(clips, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
+    return Batch(on_device(random.normal(size=(clips, frames, BANDS)), dtype), on_device(pose, dtype))
 
 
 def make_params(dtype=np.float32, model=MODEL):
@@ -74,6 +74,6 @@ def make_params(dtype=np.float32, model=MODEL):
 
     def fill(leaf):
         width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
-        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
+        return on_device(random.normal(scale=width, size=leaf.shape), dtype)
 
     return jax.tree.map(fill, jax.eval_shape(model.init, jax.random.key(0)))

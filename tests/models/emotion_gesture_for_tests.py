@@ -12,6 +12,7 @@ from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.base import Data
 from a2g_jax.models.emotion_gesture.config import PRESETS
+from tests.arrays_for_tests import on_device
 
 CONFIG = replace(
     PRESETS["tiny"],
@@ -70,11 +71,11 @@ def make_batch(clips=3, frames=CONFIG.clip_frames, dtype=np.float32, seed=2):
     words = np.where(random.uniform(size=(clips, frames)) < 0.7, random.integers(1, 2**31 - 1, (clips, frames)), 0)
     words = np.where(starts, np.maximum(words, 1), words)
     return Batch(
-        jnp.asarray(random.normal(size=(clips, frames, BANDS * SPECTRA)), dtype),
-        jnp.asarray(random.normal(size=(clips, frames, JOINTS, 6)), dtype),
-        emotion=jnp.asarray(random.integers(0, len(EMOTIONS), clips), jnp.int32),
-        words=jnp.asarray(words, jnp.int32),
-        word_starts=jnp.asarray(starts),
+        on_device(random.normal(size=(clips, frames, BANDS * SPECTRA)), dtype),
+        on_device(random.normal(size=(clips, frames, JOINTS, 6)), dtype),
+        emotion=on_device(random.integers(0, len(EMOTIONS), clips), jnp.int32),
+        words=on_device(words, jnp.int32),
+        word_starts=on_device(starts),
     )
 
 
@@ -84,8 +85,8 @@ def make_params(model, dtype=np.float32, seed=3):
 
     def fill(path, leaf):
         if path[-1].key == "scale":
-            return jnp.asarray(random.uniform(0.5, 1.5, leaf.shape), dtype)
+            return on_device(random.uniform(0.5, 1.5, leaf.shape), dtype)
         width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
-        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
+        return on_device(random.normal(scale=width, size=leaf.shape), dtype)
 
     return jax.tree_util.tree_map_with_path(fill, jax.eval_shape(model.init, jax.random.key(0)))

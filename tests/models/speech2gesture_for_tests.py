@@ -15,6 +15,7 @@ from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.base import Data
 from a2g_jax.models.speech2gesture.config import PRESETS
 from a2g_jax.training.state import joint_loss
+from tests.arrays_for_tests import on_device
 
 CONFIG = replace(
     PRESETS["tiny"],
@@ -47,7 +48,7 @@ def make_batch(representation="6d", clips=2, frames=16, dtype=np.float32):
     pose = random.normal(size=(clips, frames, ROWS, WIDTHS[representation]))
     if representation == "exponential":
         pose = np.asarray(axis_angle_from_matrix(matrix_from_6d(random.normal(size=(clips, frames, ROWS, 6)))))
-    return Batch(jnp.asarray(random.normal(size=(clips, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
+    return Batch(on_device(random.normal(size=(clips, frames, BANDS)), dtype), on_device(pose, dtype))
 
 
 def make_params(model, dtype=np.float32):
@@ -56,9 +57,9 @@ def make_params(model, dtype=np.float32):
 
     def fill(path, leaf):
         if path[-1].key == "scale":
-            return jnp.asarray(random.uniform(0.5, 1.5, leaf.shape), dtype)
+            return on_device(random.uniform(0.5, 1.5, leaf.shape), dtype)
         width = np.sqrt(1.5 / np.prod(leaf.shape[:-1])) if len(leaf.shape) > 1 else 0.3
-        return jnp.asarray(random.normal(scale=width, size=leaf.shape), dtype)
+        return on_device(random.normal(scale=width, size=leaf.shape), dtype)
 
     return jax.tree_util.tree_map_with_path(fill, jax.eval_shape(model.init, jax.random.key(0)))
 

@@ -14,6 +14,7 @@ from a2g_jax.models.audio2gestures.model import build, draw_codes
 from a2g_jax.models.audio2gestures.sampling import Audio2GesturesSampling
 from a2g_jax.models.base import Condition
 from a2g_jax.training.state import joint_loss
+from tests.arrays_for_tests import on_device
 
 SIZE, STEPS = 8, 4
 STORED = replace(
@@ -45,14 +46,19 @@ def params():
 def clips(count=3, frames=STEPS * SIZE, dtype=np.float32):
     rng = np.random.default_rng(1)
     pose = np.cumsum(rng.normal(scale=0.1, size=(count, frames, *DATA.pose_statistics.mean.shape)), axis=1) + 1.0
-    return Batch(jnp.asarray(rng.normal(size=(count, frames, BANDS)), dtype), jnp.asarray(pose, dtype))
+    return Batch(on_device(rng.normal(size=(count, frames, BANDS)), dtype), on_device(pose, dtype))
 
 
 def drawn(params, sampling, key, start=0, frames=256):
     """The specific code of a window in the steps of which it consists."""
     codec = Codec(STORED, DATA)
-    shared = codec.encode_audio(params, jnp.zeros((1, frames, BANDS)))
-    code = draw_codes(codec, sampling, params, NUMBERED, key, shared, jnp.int32(start))[1]
+
+    @jax.jit
+    def draw(params, key, start):
+        shared = codec.encode_audio(params, jnp.zeros((1, frames, BANDS)))
+        return draw_codes(codec, sampling, params, NUMBERED, key, shared, start)[1]
+
+    code = draw(params, key, jnp.int32(start))
     # Between the centres of two equal steps nothing is interpolated.
     return np.asarray(code)[0, SIZE // 2 :: SIZE, 0]
 
@@ -90,7 +96,7 @@ def test_scale_of_the_noise_is_that_of_the_code_about_its_mean(params):
 
 def test_windows_give_the_motion_of_one_pass(params):
     audio = np.random.default_rng(8).normal(size=(512, BANDS)).astype(np.float32)
-    summary = {"specific_code": jnp.asarray(np.random.default_rng(3).normal(size=(5, STEPS, 4)), jnp.float16)}
+    summary = {"specific_code": on_device(np.random.default_rng(3).normal(size=(5, STEPS, 4)), jnp.float16)}
 
     @jax.jit
     def sample(audio, key, start):
@@ -107,14 +113,15 @@ def test_windows_give_the_motion_of_one_pass(params):
 def test_the_summary_holds_the_code_of_every_clip(params):
     batch = clips()
     summary = jax.jit(MODEL.summarise)(params, jax.random.key(0), batch)
-    code = Codec(STORED, DATA).encode_motion(params, batch.pose)[1].mean
+    code = jax.jit(Codec(STORED, DATA).encode_motion)(params, batch.pose)[1].mean
     assert summary["specific_code"].dtype == jnp.float16
     np.testing.assert_allclose(summary["specific_code"], code, atol=2e-2, rtol=1e-2)
 
 
 def test_codes_of_other_clips_serve_the_losses_on_random_codes(params):
     def terms(config):
-        return joint_loss(build(config, DATA).stages[0])(params, jax.random.key(0), clips(), jnp.int32(9))[1]
+        loss = jax.jit(joint_loss(build(config, DATA).stages[0]))
+        return loss(params, jax.random.key(0), clips(), jnp.int32(9))[1]
 
     assert "mapping_net" not in params
     assert "bicycle" not in terms(STORED)

@@ -16,6 +16,7 @@ from a2g_jax.models.emotion_classifier.config import EmotionClassifierConfig
 from a2g_jax.models.emotion_classifier.model import build, classify
 from a2g_jax.models.emotion_classifier.networks import positions
 from a2g_jax.training.state import joint_loss
+from tests.arrays_for_tests import on_device
 
 LAYOUT = PoseLayout(("a", "b"), ((0, 1),))
 STATISTICS = Statistics(np.zeros((2, 2), np.float32), np.ones((2, 2), np.float32))
@@ -29,7 +30,7 @@ def batch(seed, clips=24):
     phase = random.uniform(0, 6, clips)[:, None] + np.arange(20) * 0.4 * (emotion[:, None] + 1)
     audio = np.repeat(np.sin(phase)[..., None], 3, axis=-1)
     pose = np.tile(np.cos(phase)[..., None, None], (1, 1, 2, 2))
-    return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32), jnp.asarray(emotion, jnp.int32))
+    return Batch(on_device(audio, jnp.float32), on_device(pose, jnp.float32), on_device(emotion, jnp.int32))
 
 
 SMALL = {"channels": (16, 16), "hidden": 16, "width": 16, "layers": 2, "heads": 2, "clip_frames": 20}
@@ -46,7 +47,7 @@ SMALL = {"channels": (16, 16), "hidden": 16, "width": 16, "layers": 2, "heads": 
 def test_it_learns_emotions_from_its_input_only(source, encoder, rate, steps):
     config = EmotionClassifierConfig(source, encoder, dropout=0.1, **SMALL)
     model = build(config, DATA)
-    params = model.init(jax.random.key(0))
+    params = jax.jit(model.init)(jax.random.key(0))
     optimiser = optax.adam(rate)
 
     @jax.jit
@@ -55,13 +56,15 @@ def test_it_learns_emotions_from_its_input_only(source, encoder, rate, steps):
         updates, state = optimiser.update(gradient, state)
         return optax.apply_updates(params, updates), state
 
-    state = optimiser.init(params)
+    state = jax.jit(optimiser.init)(params)
     for number in range(steps):
         params, state = step(params, state, batch(number), jax.random.key(number))
     held = batch(10_000, clips=60)
 
+    validate = jax.jit(model.stages[0].validation_loss)
+
     def right(clips):
-        return float(model.stages[0].validation_loss(params, jax.random.key(0), clips, jnp.int32(0))[1]["accuracy"])
+        return float(validate(params, jax.random.key(0), clips, jnp.int32(0))[1]["accuracy"])
 
     assert right(held) > 0.9
     other = "audio" if source == "motion" else "pose"
@@ -71,16 +74,14 @@ def test_it_learns_emotions_from_its_input_only(source, encoder, rate, steps):
 def test_dropout_acts_in_training_only():
     config = EmotionClassifierConfig(channels=(8,), hidden=8, dropout=0.5, clip_frames=20)
     model = build(config, DATA)
-    params, clips = model.init(jax.random.key(0)), batch(0)
-    losses = {
-        float(joint_loss(model.stages[0])(params, jax.random.key(seed), clips, jnp.int32(0))[0]) for seed in range(3)
-    }
-    held = {
-        float(model.stages[0].validation_loss(params, jax.random.key(seed), clips, jnp.int32(0))[0])
-        for seed in range(3)
-    }
+    params, clips = jax.jit(model.init)(jax.random.key(0)), batch(0)
+    training, validation = jax.jit(joint_loss(model.stages[0])), jax.jit(model.stages[0].validation_loss)
+    losses, held = (
+        {float(loss(params, jax.random.key(seed), clips, jnp.int32(0))[0]) for seed in range(3)}
+        for loss in (training, validation)
+    )
     assert (len(losses), len(held)) == (3, 1)
-    assert classify(config, DATA, params, clips).shape == (24, 3)
+    assert jax.eval_shape(lambda p: classify(config, DATA, p, clips), params).shape == (24, 3)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,9 @@
 """EmotionGesture in generation: chunks, windows, seed poses, seams and emotions."""
 
 from dataclasses import replace
+from functools import cache
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from emotion_gesture_for_tests import CONFIG, EMOTIONS, JOINTS, make_data, make_params
@@ -24,13 +24,19 @@ from a2g_jax.training.run import Run, RunConfig
 FRAMES = 300
 #: Seams are left as generated, and chunks are not a divisor of the windows.
 CHUNKS = replace(CONFIG, clip_frames=13)
+PLAIN = EmotionGestureSampling()
+#: A named emotion, and several over time.
+NAMED = EmotionGestureSampling("anger")
+OVER_TIME = EmotionGestureSampling("neutral@0,anger@12.5,happiness@15")
+#: Labels in place of emotion features.
+LABELS = replace(CHUNKS, branches="label")
 
 
-def make_run(sampling=None, config=CHUNKS, seed=3):
+def make_run(sampling=PLAIN, config=CHUNKS):
     """A run with drawn weights, and a summary of ten rest poses."""
     data = make_data()
     random = np.random.default_rng(1)
-    params = jax.tree.map(np.asarray, make_params(build(config, data), seed=seed))
+    params = jax.tree.map(np.asarray, make_params(build(config, data)))
     summary = {
         "rest_pose": random.normal(size=(10, JOINTS, 6)).astype(np.float16),
         "rest_speed": random.uniform(size=10).astype(np.float32),
@@ -51,7 +57,7 @@ def make_run(sampling=None, config=CHUNKS, seed=3):
         data.space,
         statistics,
         {"emotions": list(EMOTIONS), "speakers": [], "fingerprint": ""},
-        sampling=sampling or EmotionGestureSampling(),
+        sampling=sampling,
     )
     return Run(described, params, summary, 0)
 
@@ -61,15 +67,25 @@ def audio():
     return np.random.default_rng(2).normal(size=(FRAMES, 12)).astype(np.float32)
 
 
-def rows(run, audio, samples=1, window=128, **given):
+@cache
+def engine(sampling, config, window):
+    """The window loop; made once for all tests, as every one compiles its own programs."""
+    return Engine(make_run(sampling, config), window)
+
+
+def rows(audio, sampling=PLAIN, samples=1, config=CHUNKS, window=128, **given):
     """Motions by the window loop."""
-    return np.stack(list(Engine(run, window).rows(Condition(audio, **given), samples, 0)))
+    return np.stack(list(engine(sampling, config, window).rows(Condition(audio, **given), samples, 0)))
 
 
-@pytest.mark.parametrize("emotion", ["audio", "sample", "neutral@0,anger@12.5"])
-def test_windows_of_any_size_agree(audio, emotion):
-    run = make_run(EmotionGestureSampling(emotion, seam_frames=4))
-    small, large = rows(run, audio, window=128), rows(run, audio, window=384)
+def constant(emotion):
+    """Weights of one emotion in all frames."""
+    return np.tile(np.eye(3, dtype=np.float32)[EMOTIONS.index(emotion)], (FRAMES, 1))
+
+
+@pytest.mark.parametrize("sampling", [PLAIN, EmotionGestureSampling("sample"), OVER_TIME], ids=lambda s: s.emotion)
+def test_windows_of_any_size_agree(audio, sampling):
+    small, large = rows(audio, sampling, window=128), rows(audio, sampling, window=384)
     assert small.shape == (1, FRAMES, JOINTS, 6)
     # Rounding grows from chunk to chunk: each begins with the poses of the one before.
     np.testing.assert_allclose(small, large, atol=1e-3)
@@ -83,129 +99,122 @@ def continued(earlier, last, new, frames):
     end = float(frames)
     system = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [1, end, end**2, end**3], [0, 1, 2 * end, 3 * end**2]])
     cubic = np.linalg.solve(system, np.stack([gap, slope, 0 * gap, 0 * gap]).reshape(4, -1))
-    powers = np.arange(frames)[:, None] ** np.arange(4)[None]
+    rows = min(frames, len(new))
+    powers = np.arange(rows)[:, None] ** np.arange(4)[None]
     joined = new.copy()
-    joined[:frames] += (powers @ cubic).reshape(frames, *new.shape[1:])
+    joined[:rows] += (powers @ cubic).reshape(rows, *new.shape[1:])
     return joined
 
 
 def test_a_seam_has_no_step_of_place_or_speed():
     """A chunk that jumps away from the poses before it; and one that goes on as they do is left as it is."""
     time = np.arange(40)[:, None] / 15.0
-    whole = jnp.asarray(np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1), jnp.float32)
+    whole = np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1).astype(np.float32)
+    joining = jax.jit(seam, static_argnums=2)
     seed, jumped = whole[:10], whole[10:] + 0.5
     steps = lambda new: np.abs(np.diff(np.concatenate([seed, new]), 2, axis=0))  # noqa: E731
     assert steps(jumped)[8:10].max() > 0.4
-    joined = jumped + seam(seed, jumped, 10)
+    joined = jumped + np.asarray(joining(seed, jumped, 10))
     assert steps(joined).max() < 0.05
     np.testing.assert_allclose(joined[10:], jumped[10:], atol=1e-6)
-    assert np.abs(seam(seed, whole[10:], 10)).max() < 0.08
-    line = jnp.arange(12.0)[:, None]
-    np.testing.assert_allclose(seam(line[:4], line[4:], 5), 0.0, atol=1e-6)
+    assert np.abs(joining(seed, whole[10:], 10)).max() < 0.08
+    line = np.arange(12, dtype=np.float32)[:, None]
+    np.testing.assert_allclose(joining(line[:4], line[4:], 5), 0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("fading", [0, 5])
-def test_it_is_the_chunks_one_after_another(audio, fading):
+@pytest.mark.parametrize("sampling", [EmotionGestureSampling(seam_frames=0), PLAIN], ids=lambda s: s.seam_frames)
+def test_it_is_the_chunks_one_after_another(audio, sampling):
     """The window loop against a loop over chunks: each is a clip that begins with the last poses before it."""
-    run = make_run(EmotionGestureSampling(seam_frames=fading))
+    run, fading = make_run(sampling), sampling.seam_frames
     seeds = np.random.default_rng(4).normal(size=(9, JOINTS, 6)).astype(np.float32)
-    ours = rows(run, audio, seed_poses=seeds)[0]
+    ours = rows(audio, sampling, seed_poses=seeds)[0]
     first, chunk = CHUNKS.seed_frames, CHUNKS.stride
     silence = lambda frames: np.full((frames, audio.shape[1]), audio.min(), np.float32)  # noqa: E731
     padded = np.concatenate([silence(first), audio, silence(chunk)])
     space, statistics = run.config.space, run.config.statistics["pose"]
     last, made = seeds[-first:], []
-    reconstruct = jax.jit(run.config.build().reconstruct)
+    reconstruct, valid = jax.jit(run.config.build().reconstruct), jax.jit(space.valid)
     for start in range(0, FRAMES, chunk):
         poses = np.concatenate([last, np.zeros((chunk, JOINTS, 6), np.float32)])
-        batch = Batch(jnp.asarray(padded[start : start + CHUNKS.clip_frames][None]), jnp.asarray(poses[None]))
+        batch = Batch(padded[start : start + CHUNKS.clip_frames][None], poses[None])
         found = statistics.normalise(np.asarray(reconstruct(run.params, batch))[0])
         seed, new = statistics.normalise(last), found[first:].copy()
         if fading:
             new = continued(seed[-2], seed[-1], new, fading)
-        new = np.asarray(space.valid(jnp.asarray(statistics.denormalise(new), jnp.float32)))
+        new = np.asarray(valid(np.float32(statistics.denormalise(new))))
         last = np.concatenate([last, new])[-first:]
         made.append(new)
     np.testing.assert_allclose(ours, np.concatenate(made)[:FRAMES], atol=2e-4)
 
 
 def test_samples_do_not_depend_on_their_number_and_differ_by_their_first_pose(audio):
-    run = make_run()
-    two, five = rows(run, audio[:40], 2), rows(run, audio[:40], 5)
+    two, five = rows(audio[:40], samples=2), rows(audio[:40], samples=5)
     np.testing.assert_array_equal(two, five[:2])
     # A tenth of ten poses is one: without drawn emotions all motions are then the same.
     np.testing.assert_allclose(five[0], five[3], atol=1e-6)
-    drawn = rows(make_run(EmotionGestureSampling("anger")), audio[:40], 2)
+    drawn = rows(audio[:40], NAMED, 2)
     assert np.abs(drawn[0] - drawn[1]).max() > 1e-3
-    still = rows(make_run(EmotionGestureSampling("anger", temperature=0.0)), audio[:40], 2)
+    still = rows(audio[:40], replace(NAMED, temperature=0.0), 2)
     np.testing.assert_allclose(still[0], still[1], atol=1e-6)
 
 
 def test_named_emotions_reach_the_motion_at_their_time(audio):
-    neutral, timeline = (
-        rows(make_run(EmotionGestureSampling(text, seam_frames=0)), audio)[0]
-        for text in ("neutral", "neutral@0,anger@12")
-    )
-    apart = np.abs(neutral - timeline).max(axis=(1, 2))
-    change = 12 * 15
+    neutral = rows(audio, EmotionGestureSampling("label"), emotion=constant("neutral"))[0]
+    apart = np.abs(neutral - rows(audio, OVER_TIME)[0]).max(axis=(1, 2))
+    change = round(12.5 * 15)
     assert apart[: change - CHUNKS.stride].max() < 1e-6
     assert apart[change + 10 :].min() > 1e-4
 
 
 def test_labels_of_the_caller_and_where_they_are_refused(audio):
-    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
-    labelled = rows(make_run(EmotionGestureSampling("label")), audio, emotion=weights)
-    np.testing.assert_allclose(labelled, rows(make_run(EmotionGestureSampling("anger")), audio), atol=1e-6)
+    labels, anger = EmotionGestureSampling("label"), constant("anger")
+    np.testing.assert_allclose(rows(audio, labels, emotion=anger), rows(audio, NAMED), atol=1e-6)
     # Without labels it is the emotion of the audio.
-    np.testing.assert_allclose(
-        rows(make_run(EmotionGestureSampling("label")), audio), rows(make_run(), audio), atol=1e-6
-    )
+    np.testing.assert_allclose(rows(audio, labels), rows(audio), atol=1e-6)
     with pytest.raises(InputError, match="emotion_gesture: takes no emotion; it is conditioned on audio, seed_poses"):
-        rows(make_run(), audio, emotion=weights)
+        rows(audio, emotion=anger)
     with pytest.raises(InputError, match=r"second 30 is past the end of the speech, which lasts 20.00 s"):
-        rows(make_run(EmotionGestureSampling("neutral@0,anger@30")), audio)
+        rows(audio, EmotionGestureSampling("neutral@0,anger@30"))
 
 
 def test_the_ablation_with_labels_follows_them(audio):
-    config = replace(CHUNKS, branches="label")
-    made = [
-        rows(make_run(EmotionGestureSampling(text), config), audio[:40]) for text in ("audio", "anger", "happiness")
-    ]
-    assert np.abs(made[1] - made[2]).max() > 1e-3
-    assert np.abs(made[0] - made[1]).max() > 1e-3
+    free, anger, happiness = (
+        rows(audio, config=LABELS, emotion=weights) for weights in (None, constant("anger"), constant("happiness"))
+    )
+    assert np.abs(anger - happiness).max() > 1e-3
+    assert np.abs(free - anger).max() > 1e-3
+    np.testing.assert_allclose(rows(audio, NAMED, config=LABELS), anger, atol=1e-6)
+    controls = control_rows(make_run(config=LABELS), ["emotion=anger"], FRAMES)
+    np.testing.assert_array_equal(rows(audio, config=LABELS, controls=controls), anger)
 
 
 def test_a_motion_without_seed_poses_begins_in_one_of_the_calm_poses(audio):
-    run = make_run(EmotionGestureSampling(seam_frames=0))
-    calm = int(np.argmin(run.summary["rest_speed"]))
-    seeds = np.tile(run.summary["rest_pose"][calm].astype(np.float32), (CHUNKS.seed_frames, 1, 1))
-    np.testing.assert_allclose(rows(run, audio[:40]), rows(run, audio[:40], seed_poses=seeds), atol=1e-6)
+    summary = make_run().summary
+    calm = int(np.argmin(summary["rest_speed"]))
+    seeds = np.tile(summary["rest_pose"][calm].astype(np.float32), (CHUNKS.seed_frames, 1, 1))
+    np.testing.assert_allclose(rows(audio[:40]), rows(audio[:40], seed_poses=seeds), atol=1e-6)
     with pytest.raises(InputError, match="the seed poses are 3 frames; the run needs 4 or more"):
-        rows(run, audio[:40], seed_poses=seeds[:3])
+        rows(audio[:40], seed_poses=seeds[:3])
 
 
-@pytest.mark.parametrize(
-    "timeline", [pytest.param("anger", marks=pytest.mark.slow), "neutral@0,anger@12.5,happiness@15"]
-)
-def test_the_control_is_the_setting(audio, timeline):
+def test_the_control_is_the_setting(audio):
     """Of equal seeds, as lines of the settings and as an array of the caller."""
-    by_setting = rows(make_run(EmotionGestureSampling(emotion=timeline)), audio)
-    line = f"emotion={timeline}"
-    by_control = rows(make_run(EmotionGestureSampling(controls=(line,))), audio)
+    by_setting = rows(audio, OVER_TIME)
+    line = f"emotion={OVER_TIME.emotion}"
+    by_control = rows(audio, EmotionGestureSampling(controls=(line,)))
     np.testing.assert_allclose(by_control, by_setting, atol=1e-5)
-    plain = make_run()
-    given = control_rows(plain, [line], FRAMES)
-    np.testing.assert_array_equal(rows(plain, audio, controls=given), by_control)
-    np.testing.assert_allclose(rows(plain, audio, window=256, controls=given), by_control, atol=1e-5)
-    assert np.abs(by_control - rows(plain, audio)).max() > 1e-2
+    given = control_rows(make_run(), [line], FRAMES)
+    np.testing.assert_array_equal(rows(audio, controls=given), by_control)
+    np.testing.assert_allclose(rows(audio, window=256, controls=given), by_control, atol=1e-5)
+    assert np.abs(by_control - rows(audio)).max() > 1e-2
 
 
 def test_where_the_control_is_free_the_emotion_is_the_speech_s(audio):
-    run = make_run()
+    free = rows(audio)
     given = np.full((FRAMES, 1), np.nan, np.float32)
-    np.testing.assert_array_equal(rows(run, audio, controls=given), rows(run, audio))
+    np.testing.assert_array_equal(rows(audio, controls=given), free)
     given[150:] = EMOTIONS.index("anger")
-    found, free = rows(run, audio, controls=given), rows(run, audio)
+    found = rows(audio, controls=given)
     np.testing.assert_array_equal(found[:, :140], free[:, :140])
     assert np.abs(found - free)[:, 160:].max() > 1e-2
     assert np.isfinite(found).all()
@@ -218,14 +227,6 @@ def test_an_emotion_that_is_chosen_twice_is_refused(audio):
         make_run(EmotionGestureSampling(controls=("rate=0.9",))).config.build()
     with pytest.raises(InputError, match="there is no 'angry' in the run; there are: anger, happiness, neutral"):
         make_run(EmotionGestureSampling(controls=("emotion=angry",))).config.build()
-    run = make_run(EmotionGestureSampling(emotion="label"))
-    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
+    controls = np.zeros((FRAMES, 1), np.float32)
     with pytest.raises(InputError, match="emotion and controls: both choose the emotion"):
-        rows(run, audio, emotion=weights, controls=np.zeros((FRAMES, 1), np.float32))
-
-
-def test_the_ablation_with_labels_follows_the_control(audio):
-    run = make_run(config=replace(CHUNKS, branches="label"))
-    weights = np.tile(np.eye(3, dtype=np.float32)[0], (FRAMES, 1))
-    controls = control_rows(run, ["emotion=anger"], FRAMES)
-    np.testing.assert_array_equal(rows(run, audio, controls=controls), rows(run, audio, emotion=weights))
+        rows(audio, EmotionGestureSampling("label"), emotion=constant("neutral"), controls=controls)

@@ -1,4 +1,7 @@
-"""EmotionGesture: size, independence of samples, the prompts, what emotions do, and the settings that are refused."""
+"""EmotionGesture: size, independence of samples, the prompts, what emotions do, and the settings that are refused.
+
+Networks run as one compiled program each: operation by operation, they take several times as long to compile.
+"""
 
 from dataclasses import replace
 
@@ -90,17 +93,19 @@ class TestSize:
         assert 1.2e6 < size(jax.eval_shape(lambda key: finished(model, model.init(key)), jax.random.key(0))) < 2e6
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "raw" else name for name in VARIANTS]
+)
 def test_a_sample_does_not_depend_on_the_others_of_its_batch(name):
     config = VARIANTS[name]
     networks = Networks(config, make_data())
     params = make_params(build(config, make_data()))
     made = jax.jit(lambda batch: generate(networks, params, batch)[1])
     batch, other = make_batch(), make_batch(seed=9)
-    mixed = jax.tree.map(lambda ours, theirs: jnp.concatenate([ours[:1], theirs[1:]]), batch, other)
+    mixed = jax.tree.map(lambda ours, theirs: np.concatenate([ours[:1], theirs[1:]]), batch, other)
     np.testing.assert_array_equal(made(batch)[0], made(mixed)[0])
     assert np.abs(made(batch)[1] - made(mixed)[1]).max() > 1e-3
-    alone = generate(networks, params, jax.tree.map(lambda array: array[:1], batch))[1]
+    alone = made(jax.tree.map(lambda array: array[:1], batch))
     np.testing.assert_allclose(alone[0], made(batch)[0], atol=1e-5)
     assert made(batch).shape == (3, config.clip_frames, JOINTS * 6)
 
@@ -109,9 +114,9 @@ def test_a_sample_does_not_depend_on_the_others_of_its_batch(name):
 @pytest.mark.parametrize("frames", [12, 15])
 def test_both_headers_give_a_row_a_frame(header, frames):
     encoder = AudioEncoder((1, 1), (4, 6), 1, 8, header, 2, 0.0)
-    audio = jnp.asarray(np.random.default_rng(0).normal(size=(2, frames, 12)), jnp.float32)
-    params = encoder.init(jax.random.key(0), audio, True)
-    assert encoder.apply(params, audio, True).shape == (2, frames, 8)
+    audio = jnp.zeros((2, frames, 12))
+    rows, _ = jax.eval_shape(lambda key: encoder.init_with_output(key, audio, True), jax.random.key(0))
+    assert rows.shape == (2, frames, 8)
 
 
 def test_the_aligned_header_keeps_time():
@@ -122,8 +127,8 @@ def test_the_aligned_header_keeps_time():
     changes = {}
     for header in ("aligned", "channels"):
         encoder = AudioEncoder((1, 1), (4, 6), 1, 8, header, 2, 0.0)
-        params = encoder.init(jax.random.key(1), jnp.asarray(audio), True)
-        silent, click = encoder.apply(params, jnp.asarray(audio), True)
+        encode = jax.jit(lambda key, one=encoder: one.init_with_output(key, jnp.asarray(audio), True)[0])
+        silent, click = np.asarray(encode(jax.random.key(1)))
         changes[header] = np.linalg.norm(click - silent, axis=-1)
     near = changes["aligned"][22:27].mean() / changes["aligned"][:12].mean()
     assert near > 1.5
@@ -162,7 +167,8 @@ class TestPrompts:
         own = {"params": params["generator"]["prompter"]}
         for kind in ("spatial-temporal", "spatial", "predictor"):
             networks = Networks(replace(CONFIG, prompter=kind), make_data())
-            made[kind] = np.asarray(networks._generator["prompter"].apply(own, seed, True))[0]
+            prompter = networks._generator["prompter"]
+            made[kind] = np.asarray(jax.jit(lambda one, apply=prompter.apply: apply(one, seed, True))(own))[0]
         m, length = CONFIG.seed_frames, CONFIG.transition_frames
         for kind in ("spatial", "predictor"):
             changed = np.abs(made["spatial-temporal"] - made[kind]).max(axis=-1) > 1e-6
@@ -185,11 +191,12 @@ def test_the_held_pose_fades_to_the_mean_pose(normalise):
     networks = Networks(config, data)
     params = make_params(build(config, data))
     generator = dict(params["generator"])
-    generator["decoder"] = jax.tree.map(jnp.zeros_like, generator["decoder"])
-    generator["hold"] = jax.tree.map(jnp.zeros_like, generator["hold"])
+    generator["decoder"] = jax.tree.map(np.zeros_like, generator["decoder"])
+    generator["hold"] = jax.tree.map(np.zeros_like, generator["hold"])
     batch = make_batch()
-    pose = networks.pose(generate(networks, {**params, "generator": generator}, batch)[1])[0]
-    seed = batch.pose[0, : config.seed_frames]
+    made = jax.jit(lambda params: networks.pose(generate(networks, params, batch)[1]))
+    pose = np.asarray(made({**params, "generator": generator}))[0]
+    seed = np.asarray(batch.pose[0, : config.seed_frames])
     np.testing.assert_allclose(pose[: config.seed_frames], seed, atol=1e-5)
     place = seed[-1]
     for frame in range(config.stride):
@@ -223,7 +230,8 @@ class TestObjective:
         config = replace(config, shown_emotion_weight=1.0)
         with jax.enable_x64(True):
             model = build(config, make_data())
-            params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
+            # On the host: changes of parameters and comparisons with zero are then no programs.
+            params, batch = jax.device_get(make_params(model, np.float64)), make_batch(dtype=np.float64)
         weights = {
             "reconstruction": 2.0,
             "smooth": 0.7,
@@ -239,8 +247,9 @@ class TestObjective:
             total, terms = joint_loss(stage(model, "main"))(params, jax.random.key(0), batch, jnp.int32(0))
             return chosen["total"] * total + sum(chosen[name] * terms[name] for name in weights)
 
-        function = jax.jit(jax.value_and_grad(mixed))
-        choose = lambda *names: {n: jnp.asarray(1.0 if n in names else 0.0) for n in (*weights, "total")}  # noqa: E731
+        compiled = jax.jit(jax.value_and_grad(mixed))
+        function = lambda params, chosen: jax.device_get(compiled(params, chosen))  # noqa: E731
+        choose = lambda *names: {n: np.float64(n in names) for n in (*weights, "total")}  # noqa: E731
         return function, params, choose, weights
 
     def test_each_side_moves_its_own_network(self, sides, x64):
@@ -317,35 +326,44 @@ class TestObjective:
         config = replace(CONFIG, discriminator=discriminator)
         networks, batch = Networks(config, make_data()), make_batch()
         params = make_params(build(config, make_data()))
-        motion, label = networks.flat(batch.pose), jax.nn.one_hot(batch.emotion, 3)
-        logits, emotions = networks.judge(params, motion, batch.audio, label)
+        motion, label = np.asarray(networks.flat(batch.pose)), np.eye(3, dtype=np.float32)[batch.emotion]
+        judge = jax.jit(networks.judge)
+        logits, emotions = judge(params, motion, batch.audio, label)
         assert logits.shape == (3,)
         patches = discriminator == "patches"
         assert (None if emotions is None else emotions.shape) == ((3, 3) if patches else None)
         changed = {
-            "audio": networks.judge(params, motion, -batch.audio, label)[0],
-            "label": networks.judge(params, motion, batch.audio, jnp.roll(label, 1, axis=1))[0],
-            "first": networks.judge(params, motion.at[:, :2].multiply(2.0), batch.audio, label)[0],
+            "audio": judge(params, motion, -batch.audio, label)[0],
+            "label": judge(params, motion, batch.audio, np.roll(label, 1, axis=1))[0],
+            "first": judge(params, np.concatenate([2 * motion[:, :2], motion[:, 2:]], axis=1), batch.audio, label)[0],
         }
         expected = {"audio": patches, "label": patches, "first": not patches}
-        assert {name: bool(np.any(value != logits)) for name, value in changed.items()} == expected
+        assert {name: bool(np.any(np.asarray(value) != logits)) for name, value in changed.items()} == expected
 
-    def test_motion_with_the_audio_of_another_clip_counts_as_false(self):
-        batch, found = make_batch(), {}
-        for mismatched in (False, True):
-            config = replace(CONFIG, mismatched=mismatched)
-            model, networks = build(config, make_data()), Networks(config, make_data())
-            params = make_params(model)
-            found[mismatched] = stage(model, "main").updates[0].loss(params, jax.random.key(0), batch, jnp.int32(0))[0]
-            score = networks.judge(
-                params, networks.flat(batch.pose), jnp.roll(batch.audio, 1, axis=0), jax.nn.one_hot(batch.emotion, 3)
-            )[0]
-        # Six generated motions and three mismatched pairs: the mean over false ones is over nine.
-        fake = jnp.mean(jax.nn.softplus(score))
-        audio, made, _ = generate(networks, params, batch)
-        own = networks.judge(params, *judged(networks, params, batch, audio, made, None))[0]
-        before = jnp.mean(jax.nn.softplus(own))
-        np.testing.assert_allclose(found[True] - found[False], (6 * before + 3 * fake) / 9 - before, atol=1e-5)
+    def test_motion_with_the_audio_of_another_clip_counts_as_false(self, sides):
+        networks, batch = Networks(CONFIG, make_data()), make_batch()
+        model = build(replace(CONFIG, mismatched=False), make_data())
+        params = make_params(model)
+
+        @jax.jit
+        def scores(params):
+            label, recorded = jax.nn.one_hot(batch.emotion, 3), networks.flat(batch.pose)
+            true = networks.judge(params, recorded, batch.audio, label)[0]
+            other = networks.judge(params, recorded, jnp.roll(batch.audio, 1, axis=0), label)[0]
+            audio, made, _ = generate(networks, params, batch)
+            return true, other, networks.judge(params, *judged(networks, params, batch, audio, made, None))[0]
+
+        true, other, made = map(np.asarray, scores(params))
+        real, mismatched, false = (np.mean(np.logaddexp(0, score)) for score in (-true, other, made))
+        # The fixture's model has them. Six generated motions and three mismatched pairs: the mean is over nine.
+        assert CONFIG.mismatched
+        function, own, choose, _ = sides
+        with jax.enable_x64(True):
+            found = function(own, choose("discriminator"))[0]
+        np.testing.assert_allclose(found, real + (6 * false + 3 * mismatched) / 9, atol=1e-5)
+        loss = jax.jit(stage(model, "main").updates[0].loss)
+        without = loss(params, jax.random.key(0), batch, jnp.int32(0))[1]["discriminator"]
+        np.testing.assert_allclose(without, real + false, atol=1e-5)
 
     def test_audio_joins_the_queries_of_its_frames(self):
         moved = {}
@@ -353,36 +371,52 @@ class TestObjective:
             config = replace(CONFIG, query_audio=joined)
             networks, batch = Networks(config, make_data()), make_batch()
             params = make_params(build(config, make_data()))
-            audio = networks.encode_audio(params, batch.audio)
-            seed = networks.flat(batch.pose)[:, : CONFIG.seed_frames]
-            bumped = audio._replace(beat=audio.beat.at[:, 9].add(1.0))
-            moved[joined] = np.abs(networks.decode(params, bumped, seed) - networks.decode(params, audio, seed))
+
+            @jax.jit
+            def change(params, networks=networks, batch=batch):
+                audio = networks.encode_audio(params, batch.audio)
+                seed = networks.flat(batch.pose)[:, : CONFIG.seed_frames]
+                bumped = audio._replace(beat=audio.beat.at[:, 9].add(1.0))
+                return networks.decode(params, bumped, seed) - networks.decode(params, audio, seed)
+
+            moved[joined] = np.abs(change(params))
         assert moved[True][:, 9].mean() > 2.0 * moved[True][:, :6].mean()
 
     def test_emotion_features_are_exchanged_with_their_labels(self):
         networks, batch = Networks(CONFIG, make_data()), make_batch()
         params = make_params(build(CONFIG, make_data()))
-        audio, made, target = generate(networks, params, batch)
-        both = judged(networks, params, batch, audio, made, None)
+
+        @jax.jit
+        def exchanged(params):
+            audio, made, target = generate(networks, params, batch)
+            mixed = audio._replace(emotion=audio.emotion[jnp.array([2, 0, 1])])
+            own = networks.decode(params, mixed, target[:, : CONFIG.seed_frames])
+            return made, judged(networks, params, batch, audio, made, None), own
+
+        made, both, own = jax.device_get(exchanged(params))
         np.testing.assert_array_equal(both.motion[:3], made)
-        np.testing.assert_array_equal(both.label[3:], jnp.roll(both.label[:3], 1, axis=0))
+        np.testing.assert_array_equal(both.label[3:], np.roll(both.label[:3], 1, axis=0))
         np.testing.assert_array_equal(both.audio[3:], both.audio[:3])
-        mixed = audio._replace(emotion=audio.emotion[jnp.array([2, 0, 1])])
-        own = networks.decode(params, mixed, target[:, : CONFIG.seed_frames])
         np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
         assert np.abs(both.motion[3:] - made).max() > 1e-3
         for config in (replace(CONFIG, exchange=False), replace(CONFIG, discriminator="transformer")):
-            assert len(judged(Networks(config, make_data()), params, batch, audio, made, None).motion) == 3
+            without = Networks(config, make_data())
+
+            def alone(params, networks=without):
+                audio, made, _ = generate(networks, params, batch)
+                return judged(networks, params, batch, audio, made, None)
+
+            assert len(jax.eval_shape(alone, params).motion) == 3
 
     def test_the_vae_has_the_numerical_gradient_and_trains_alone(self, x64):
         model = build(CONFIG, make_data())
-        params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
+        params, batch = jax.device_get(make_params(model, np.float64)), make_batch(dtype=np.float64)
         function = jax.jit(
             jax.value_and_grad(
                 lambda p: stage(model, "emotion_vae").updates[0].loss(p, jax.random.key(1), batch, jnp.int32(0))[0]
             )
         )
-        gradient = function(params)[1]
+        gradient = jax.device_get(function(params)[1])
         assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient["generator"]))
         random = np.random.default_rng(8)
         way = jax.tree.map(lambda leaf: random.normal(size=leaf.shape), params["vae"])
@@ -399,15 +433,21 @@ class TestObjective:
     def test_sampled_emotions_are_exchanged_and_features_are_constants(self):
         model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()
         params = make_params(model)
-        audio, made, target = generate(networks, params, batch)
-        latent = jax.random.normal(jax.random.key(3), (3, CONFIG.vae_latent))
-        both = judged(networks, params, batch, audio, made, None, latent)
-        features = networks.decode_emotion(params, latent, both.label[3:])
-        seed = continued(networks, params, audio, features, target[:, : CONFIG.seed_frames], None)
-        own = networks.decode(params, audio._replace(emotion=features), seed)
-        np.testing.assert_allclose(both.motion[3:], own, atol=1e-6)
+
+        @jax.jit
+        def exchanged(params):
+            audio, made, target = generate(networks, params, batch)
+            latent = jax.random.normal(jax.random.key(3), (3, CONFIG.vae_latent))
+            both = judged(networks, params, batch, audio, made, None, latent)
+            features = networks.decode_emotion(params, latent, both.label[3:])
+            seed = continued(networks, params, audio, features, target[:, : CONFIG.seed_frames], None)
+            return both.motion[3:], networks.decode(params, audio._replace(emotion=features), seed)
+
+        found, own = exchanged(params)
+        np.testing.assert_allclose(found, own, atol=1e-6)
         generator = stage(model, "sampled").updates[1].loss
         gradient = jax.jit(jax.grad(lambda p: generator(p, jax.random.key(0), batch, jnp.int32(0))[0]))(params)
+        gradient = jax.device_get(gradient)
         moved = {
             name
             for name, tree in gradient["generator"].items()
@@ -450,28 +490,39 @@ class TestObjective:
         config = replace(CONFIG, continued_chunks=2)
         networks, batch = Networks(config, make_data()), make_batch()
         params = make_params(build(config, make_data()))
-        audio, _, target = generate(networks, params, batch)
-        recorded = target[:, : config.seed_frames]
-        found = continued(networks, params, audio, audio.emotion, recorded, None)
-        np.testing.assert_array_equal(found[0], recorded[0])
-        expected = recorded
-        for chunk, before in enumerate(([2, 0, 1], [1, 2, 0]), start=1):
-            mixed = audio._replace(beat=audio.beat[jnp.array(before)])
-            made = networks.pose(networks.decode(params, mixed, expected)[:, -config.seed_frames :])
-            expected = networks.flat(networks.data.space.valid(made))
-            np.testing.assert_allclose(found[chunk], expected[chunk], atol=1e-5)
-        grow = lambda p: jnp.sum(continued(networks, p, audio, audio.emotion, recorded, None))  # noqa: E731
-        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(jax.grad(grow)(params)))
+        first = slice(config.seed_frames)
+
+        def proceed(params, networks=networks):
+            audio, _, target = generate(networks, params, batch)
+            return continued(networks, params, audio, audio.emotion, target[:, first], None)
+
+        @jax.jit
+        def expectation(params):
+            """The initial poses after no, one and two chunks."""
+            audio, _, target = generate(networks, params, batch)
+            poses = [target[:, first]]
+            for before in ([2, 0, 1], [1, 2, 0]):
+                mixed = audio._replace(beat=audio.beat[jnp.array(before)])
+                made = networks.pose(networks.decode(params, mixed, poses[-1])[:, -config.seed_frames :])
+                poses.append(networks.flat(networks.data.space.valid(made)))
+            return poses
+
+        found, expected = np.asarray(jax.jit(proceed)(params)), expectation(params)
+        np.testing.assert_array_equal(found[0], expected[0][0])
+        for chunk in (1, 2):
+            np.testing.assert_allclose(found[chunk], expected[chunk][chunk], atol=1e-5)
+        gradient = jax.device_get(jax.jit(jax.grad(lambda params: jnp.sum(proceed(params))))(params))
+        assert all(np.all(leaf == 0) for leaf in jax.tree.leaves(gradient))
         none = Networks(replace(config, continued_chunks=0), make_data())
-        np.testing.assert_array_equal(continued(none, params, audio, audio.emotion, recorded, None), recorded)
+        np.testing.assert_array_equal(jax.jit(lambda params: proceed(params, none))(params), expected[0])
 
     def test_the_vae_begins_with_the_scale_of_the_features(self):
         model, networks, batch = build(CONFIG, make_data()), Networks(CONFIG, make_data()), make_batch()
         params = make_params(model)
-        features = networks.encode_audio(params, batch.audio).emotion
-        measured = stage(model, "emotion_vae").warm_start(params, batch)["vae"]["features"]
-        np.testing.assert_allclose(measured["mean"], jnp.mean(features, axis=(0, 1)), rtol=1e-5)
-        np.testing.assert_allclose(measured["scale"], jnp.std(features, axis=(0, 1)), rtol=0.1, atol=1e-3)
+        features = np.asarray(jax.jit(networks.encode_audio)(params, batch.audio).emotion)
+        measured = jax.jit(stage(model, "emotion_vae").warm_start)(params, batch)["vae"]["features"]
+        np.testing.assert_allclose(measured["mean"], np.mean(features, axis=(0, 1)), rtol=1e-5)
+        np.testing.assert_allclose(measured["scale"], np.std(features, axis=(0, 1)), rtol=0.1, atol=1e-3)
 
 
 class TestSettings:
@@ -535,7 +586,7 @@ class TestEmotions:
         networks = Networks(CONFIG, make_data())
         params = make_params(build(CONFIG, make_data()))
         frames = CONFIG.clip_frames
-        draw = lambda weights: sample_emotion(networks, params, jax.random.key(4), 1.0, jnp.asarray(weights))  # noqa: E731
+        draw = jax.jit(lambda weights: sample_emotion(networks, params, jax.random.key(4), 1.0, weights))
         pure = [draw(np.tile(row, (frames, 1)).astype(np.float32)) for row in np.eye(3)]
         blend = np.linspace(0, 1, frames, dtype=np.float32)[:, None]
         mixed = draw(np.concatenate([1 - blend, blend, np.zeros_like(blend)], axis=1))

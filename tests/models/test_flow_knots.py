@@ -1,7 +1,7 @@
 """The flow on knots of a spline: windows, latents, constant channels, removal of noise, hidden conditioning."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,7 @@ from a2g_jax.models.stylized_flow.model import build, draw_latents
 from a2g_jax.models.stylized_flow.networks import Extras, FlowNetworks
 from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.training.state import joint_loss
+from tests.arrays_for_tests import on_device
 
 CONFIG = StylizedFlowConfig(
     flow_steps=2,
@@ -60,7 +61,7 @@ def batch_of(clips=4, frames=120, seed=0):
     audio = rng.normal(size=(clips, frames, 4)).astype(np.float32)
     pose = np.cumsum(0.3 * rng.normal(size=(clips, frames, 2, 3)), axis=1).astype(np.float32)
     pose[..., 1, 2] = 0.5
-    return Batch(jnp.asarray(audio), jnp.asarray(pose), other_pose=jnp.asarray(pose[::-1]))
+    return Batch(on_device(audio), on_device(pose), other_pose=on_device(pose[::-1]))
 
 
 @cache
@@ -75,13 +76,14 @@ def fitted_params(config):
 
 def fitted(config=CONFIG, sampling=AS_DRAWN):
     """A model, and parameters whose couplings are not the identity; how it is sampled is no part of them."""
-    return build(config, DATA, sampling), jax.tree.map(jnp.asarray, fitted_params(config))
+    return build(config, DATA, sampling), jax.tree.map(on_device, fitted_params(config))
 
 
 def test_any_windows_give_the_same_motion():
     model, params = fitted(sampling=StylizedFlowSampling())
     key, audio = jax.random.key(3), batch_of(clips=1, frames=640).audio[0]
-    given = jax.jit(model.condition)(params, {}, Condition(audio, style=jnp.array([0.3, -0.2, 0.5])))
+    style = np.array([0.3, -0.2, 0.5], np.float32)
+    given = jax.device_get(jax.jit(model.condition)(params, {}, Condition(audio, style=style)))
     begin, proceed = jax.jit(model.begin), jax.jit(model.proceed)
 
     def in_windows(frames):
@@ -106,13 +108,15 @@ def test_latents_of_a_motion_are_those_that_were_drawn():
     pose = jax.jit(model.sample)(params, {}, key, given, jnp.int32(0))
     assert pose.shape == (384, 2, 3)
     before, after = model.seed_frames, model.lookahead
-    around = jnp.pad(audio, ((before, after), (0, 0)))
-    clip = jnp.concatenate([jnp.full((before, 2, 3), 0.5), pose, jnp.repeat(pose[-1:], after, axis=0)])
-    controls = jnp.zeros((len(clip), 0))
+    around = np.pad(audio, ((before, after), (0, 0)))
+    still = np.full((before, 2, 3), 0.5, np.float32)
+    clip = np.concatenate([still, pose, np.repeat(np.asarray(pose)[-1:], after, axis=0)])
+    controls = np.zeros((len(clip), 0), np.float32)
     z = jax.jit(lambda *given: model.encode(params, *given, None))(around, clip, controls)
     drawn = draw_latents(1.0, CONFIG.freedom, key, jnp.int32(0), 384, 5)
     assert z.shape == drawn.shape
     # Every third row is that of a knot; the fit at the ends is no spline's.
+    z, drawn = np.asarray(z), np.asarray(drawn)
     np.testing.assert_allclose(z[60:-60:3], drawn[60:-60:3], atol=0.1)
     np.testing.assert_array_equal(z[0], z[2])
 
@@ -122,10 +126,11 @@ def test_constant_channels_have_no_density_and_stay_at_their_mean():
     given = jax.jit(model.condition)(params, {}, Condition(batch_of(1, 128).audio[0]))
     pose = jax.jit(model.sample)(params, {}, jax.random.key(0), given, jnp.int32(0))
     assert model.density.dimensions == 5
-    np.testing.assert_array_equal(pose[:, 1, 2], np.float32(0.5))
+    np.testing.assert_array_equal(np.asarray(pose)[:, 1, 2], np.float32(0.5))
     batch = batch_of()
     density = jax.jit(model.density.log_likelihood)
-    moved = batch.pose.at[..., 1, 2].add(1.0)
+    moved = np.array(batch.pose)
+    moved[..., 1, 2] += 1.0
     np.testing.assert_array_equal(density(params, batch.audio, batch.pose), density(params, batch.audio, moved))
     with pytest.raises(InputError, match="--least-std 9: leaves 0 channels"):
         build(replace(CONFIG, least_std=9.0), DATA)
@@ -141,22 +146,20 @@ def test_removed_noise_is_the_gradient_of_the_log_density(x64, changes):
     networks = FlowNetworks(config, DATA)
     with jax.enable_x64(False):
         params = jax.device_get(fitted(config)[1])
-    params = jax.tree.map(lambda a: jnp.asarray(a, jnp.float64), params)
-    history = jax.random.normal(jax.random.key(2), (1, 24, 5))
-    audio = jax.random.normal(jax.random.key(3), (1, 4))
-    z = jax.random.normal(jax.random.key(4), (1, 1, 5))
-    given = networks.audio_context(params, audio)
+    params = jax.tree.map(lambda a: on_device(a, jnp.float64), params)
+    random = np.random.default_rng(2)
+    history, audio, z = (on_device(random.normal(size=size)) for size in ((1, 24, 5), (1, 4), (1, 1, 5)))
 
     @jax.jit
-    def one():
-        state = start(networks, params, 1, history[0])
+    def one(z):
+        state, given = start(networks, params, 1, history[0]), networks.audio_context(params, audio)
         drawn, shown = (
             proceed(networks, params, z, given, state, jnp.int32(0), Sampling(noise=noise))[0][0, 0]
             for noise in (0.0, 0.1)
         )
         return drawn, shown - drawn
 
-    drawn, change = one()
+    drawn, change = map(np.asarray, one(z))
 
     @jax.jit
     def log_density(x):
@@ -177,13 +180,12 @@ def test_what_is_hidden_has_no_effect_and_what_is_shown_has():
     context = jax.jit(
         lambda extras: networks.conditioning(params, batch.audio, networks.flat(batch.pose), None, extras)
     )
-    code = jnp.ones((4, 3))
-    styled = jnp.array([True, True, False, False])
-    shown = context(Extras(style=code, styled=styled)).context
-    plain = context(Extras()).context
+    code = np.ones((4, 3), np.float32)
+    styled = np.array([True, True, False, False])
+    found = Extras(style=code, styled=styled), Extras(), Extras(mirrored=styled)
+    shown, plain, mirrored = (np.asarray(context(extras).context) for extras in found)
     np.testing.assert_array_equal(shown[2:], plain[2:])
     assert np.abs(shown[:2] - plain[:2]).max() == 1.0
-    mirrored = context(Extras(mirrored=styled)).context
     np.testing.assert_array_equal((mirrored != plain).any(axis=(1, 2)), styled)
 
 
@@ -191,32 +193,41 @@ def test_what_is_hidden_has_no_effect_and_what_is_shown_has():
 def test_the_expectation_of_the_last_pose_is_the_same_in_training_and_generation(history_input):
     networks = FlowNetworks(replace(CONFIG, history_input=history_input), DATA)
     _, params = fitted()
-    before = jax.random.normal(jax.random.key(0), (1, 1, 8, 5))
-    whole = networks.visible(params, before)
-    masks = jax.random.bernoulli(jax.random.key(1), 0.75, (1, 4000, 8))
-    seen = networks.visible(params, jnp.broadcast_to(before, (1, 4000, 8, 5)), masks)
+    random = np.random.default_rng(0)
+    before = random.normal(size=(1, 1, 8, 5)).astype(np.float32)
+    masks = random.uniform(size=(1, 4000, 8)) < 0.75
+    visible = jax.jit(networks.visible)
+    whole = np.asarray(visible(params, before))
+    seen = np.asarray(visible(params, np.broadcast_to(before, (1, 4000, 8, 5)), masks))
     np.testing.assert_allclose(seen.mean(axis=1)[0, -1], whole[0, 0, -1], atol=0.08)
 
 
 def test_guidance_of_one_and_of_the_same_condition_change_nothing():
     _, params = fitted()
     networks = FlowNetworks(CONFIG, DATA)
-    audio, code = batch_of(1, 30).audio[0], jnp.array([[0.5, -0.5, 0.9]])
-    z = jax.random.normal(jax.random.key(0), (36, 1, 5))
+    audio, code = batch_of(1, 30).audio[0], np.array([[0.5, -0.5, 0.9]], np.float32)
+    z = on_device(np.random.default_rng(0).normal(size=(36, 1, 5)), jnp.float32)
 
-    given = networks.audio_context(params, jnp.pad(audio, ((0, 6), (0, 0))), Extras(style=code))
-    plain = proceed(networks, params, z, given, start(networks, params, 1), jnp.int32(0))[0]
-    how = Sampling(guidance=3.0)
-    twice = given._replace(unguided=given.projected)
-    unchanged = proceed(networks, params, z, twice, start(networks, params, 1, how=how), jnp.int32(0), how)[0]
-    np.testing.assert_allclose(unchanged, plain, atol=1e-5)
-    guided = networks.audio_context(params, jnp.pad(audio, ((0, 6), (0, 0))), Extras(style=code), guided=True)
-    stronger = proceed(networks, params, z, guided, start(networks, params, 1, how=how), jnp.int32(0), how)[0]
+    @jax.jit
+    def context(params):
+        return networks.audio_context(params, jnp.pad(audio, ((0, 6), (0, 0))), Extras(style=code), guided=True)
+
+    @partial(jax.jit, static_argnums=2)
+    def motion(params, given, guidance):
+        how = Sampling(guidance=guidance)
+        before = start(networks, params, 1, how=how)
+        poses, after = proceed(networks, params, z, given, before, jnp.int32(0), how)
+        return poses, before, after
+
+    guided = context(params)
+    given = guided._replace(unguided=())
+    plain, stronger = np.asarray(motion(params, given, 1.0)[0]), np.asarray(motion(params, guided, 3.0)[0])
+    np.testing.assert_allclose(motion(params, given._replace(unguided=given.projected), 3.0)[0], plain, atol=1e-5)
     assert np.abs(stronger - plain).max() > 1e-3
     # Without a style there is nothing to guide, and motion is plain to the bit.
-    free, state = proceed(networks, params, z, given, start(networks, params, 1, how=how), jnp.int32(0), how)
+    free, before, after = motion(params, given, 3.0)
     np.testing.assert_array_equal(free, plain)
-    assert jax.tree.map(jnp.shape, state) == jax.tree.map(jnp.shape, start(networks, params, 1, how=how))
+    assert jax.tree.map(np.shape, after) == jax.tree.map(np.shape, before)
 
 
 @pytest.mark.slow
@@ -226,7 +237,7 @@ def test_gradients_of_the_loss_with_everything_hidden_and_shown(x64):
         model, params = fitted(config)
         params = jax.device_get(params)
         batch = jax.device_get(batch_of(clips=2))
-    wide = lambda tree: jax.tree.map(lambda a: jnp.asarray(a, jnp.float64) if a.dtype.kind == "f" else a, tree)  # noqa: E731
+    wide = lambda tree: jax.tree.map(lambda a: on_device(a, jnp.float64) if a.dtype.kind == "f" else a, tree)  # noqa: E731
     params, batch = wide(params), wide(batch)
     loss = joint_loss(model.stages[0])
     value = jax.jit(lambda params: loss(params, jax.random.key(5), batch, jnp.int32(0))[0])

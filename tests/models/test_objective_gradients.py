@@ -18,6 +18,7 @@ from a2g_jax.models.motion_autoencoder.config import MotionAutoencoderConfig
 from a2g_jax.models.motion_autoencoder.model import encode
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.training.state import joint_loss
+from tests.arrays_for_tests import on_device
 
 LAYOUT = PoseLayout(("a", "b", "c"), ((0, 1), (1, 2)))
 CHAIN = Skeleton(np.array([[0, 0, 0], [0, 0.3, 0], [0.2, 0, 0]], np.float32), ("a", "b", "c"), (-1, 0, 1))
@@ -43,7 +44,7 @@ def batch_of(kind, frames, clips=3, seed=0):
     else:
         pose = np.cumsum(0.3 * random.normal(size=(clips, frames, *shape)), axis=1)
     audio = random.normal(size=(clips, frames, 4))
-    return Batch(jnp.asarray(audio), jnp.asarray(pose), jnp.asarray(random.integers(0, 3, clips), jnp.int32))
+    return Batch(on_device(audio), on_device(pose), on_device(random.integers(0, 3, clips), jnp.int32))
 
 
 def in_double(tree):
@@ -51,7 +52,7 @@ def in_double(tree):
     leaves, form = jax.tree.flatten(jax.device_get(tree))
     random = np.random.default_rng(7)
     wide = [a + 0.05 * random.normal(size=a.shape) if a.dtype.kind == "f" and a.ndim else a for a in leaves]
-    return form.unflatten([jnp.asarray(a, jnp.float64) if a.dtype.kind == "f" else a for a in wide])
+    return form.unflatten([on_device(a, jnp.float64) if a.dtype.kind == "f" else a for a in wide])
 
 
 def check(function, params, seed=0, step=1e-6, rtol=1e-5, fixed=()):
@@ -64,7 +65,7 @@ def check(function, params, seed=0, step=1e-6, rtol=1e-5, fixed=()):
     gradient = function(params)[1]
     random = np.random.default_rng(seed)
     for name in params:
-        leaves, form = jax.tree.flatten(params[name])
+        leaves, form = jax.tree.flatten(jax.device_get(params[name]))
         paths = [path for path, _ in jax.tree_util.tree_leaves_with_path(params[name])]
         still = [any(getattr(key, "key", None) in fixed for key in path) for path in paths]
         way = [0.0 if stays else random.normal(size=a.shape) for stays, a in zip(still, leaves, strict=True)]
@@ -91,7 +92,7 @@ def test_emotion_classifier(x64, source, encoder):
         source, encoder, channels=(6, 6), hidden=6, width=8, layers=2, heads=2, dropout=0.3, clip_frames=12
     )
     model, batch = emotion_classifier.ENTRY.builder()(config, data_of("directions")), batch_of("directions", 12)
-    params = in_double(model.init(jax.random.key(0)))
+    params = in_double(jax.jit(model.init)(jax.random.key(0)))
     gradient = check(objective(joint_loss(model.stages[0]), batch), params)
     for path, leaf in jax.tree_util.tree_leaves_with_path(gradient):
         assert np.isfinite(leaf).all(), path
@@ -104,9 +105,9 @@ def test_motion_autoencoder(x64, kind):
         encoder_channels=(6, 6, 6, 8, 4), decoder_channels=(4, 6), clip_frames=16, noise=0.1
     )
     model, batch = motion_autoencoder.ENTRY.builder()(config, data_of(kind)), batch_of(kind, 16)
-    params = in_double(model.init(jax.random.key(1)))
+    params = in_double(jax.jit(model.init)(jax.random.key(1)))
     loss = joint_loss(model.stages[0])
-    terms = loss(params, jax.random.key(3), batch, jnp.int32(0))[1]
+    terms = jax.eval_shape(loss, params, jax.random.key(3), batch, jnp.int32(0))[1]
     assert ("value" in terms) == (kind in ("directions", "keypoints"))
     gradient = check(objective(loss, batch), params)
     for path, leaf in jax.tree_util.tree_leaves_with_path(gradient):
@@ -122,7 +123,7 @@ def test_complete_objective_of_the_flow(x64):
     )  # fmt: skip
     kind, features = "directions", MotionAutoencoderConfig((4, 4, 4, 5, 3), (3,), clip_frames=8)
     data = data_of(kind)
-    frozen = in_double(motion_autoencoder.ENTRY.builder()(features, data).init(jax.random.key(2)))
+    frozen = in_double(jax.jit(motion_autoencoder.ENTRY.builder()(features, data).init)(jax.random.key(2)))
     data = data._replace(perceptual=lambda pose: encode(features, data_of(kind), frozen, pose))
     model, batch = stylized_flow.ENTRY.builder()(config, data), batch_of(kind, 14)
     params = in_double(jax.jit(model.stages[0].warm_start)(jax.jit(model.init)(jax.random.key(0)), batch))
@@ -140,7 +141,7 @@ def test_complete_objective_of_the_flow(x64):
     for weights in np.eye(3):
 
         def one(params, weights=weights):
-            (value, _), gradient = function(params, jnp.asarray(weights))
+            (value, _), gradient = function(params, on_device(weights))
             return value, gradient
 
         check(one, params, fixed=FIXED, rtol=1e-4)

@@ -1,7 +1,6 @@
 """Speech2Gesture: the gradients of the losses of both networks."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from speech2gesture_for_tests import CONFIG, make_batch, make_data, make_params, terms_of
@@ -11,18 +10,22 @@ from a2g_jax.models.speech2gesture.model import build
 
 @pytest.fixture(scope="module")
 def sides():
-    """Gradients of the total, and of any one term, in double precision."""
+    """Gradients of the total, and of any one term, in double precision.
+
+    Parameters and gradients are on the host, where changing them compiles nothing.
+    """
     with jax.enable_x64(True):
         model = build(CONFIG, make_data())
-        params, batch = make_params(model, np.float64), make_batch(dtype=np.float64)
+        params, batch = jax.device_get(make_params(model, np.float64)), make_batch(dtype=np.float64)
     names = ("rotation", "position", "speed", "adversarial", "discriminator")
 
     def mixed(params, weights):
         total, terms = terms_of(model, params, batch)
         return weights["total"] * total + sum(weights[name] * terms[name] for name in names)
 
-    function = jax.jit(jax.value_and_grad(mixed))
-    choose = lambda *chosen: {n: jnp.asarray(1.0 if n in chosen else 0.0) for n in (*names, "total")}  # noqa: E731
+    compiled = jax.jit(jax.value_and_grad(mixed))
+    function = lambda params, weights: jax.device_get(compiled(params, weights))  # noqa: E731
+    choose = lambda *chosen: {n: np.float64(n in chosen) for n in (*names, "total")}  # noqa: E731
     return function, params, choose
 
 

@@ -26,6 +26,7 @@ from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans
 from a2g_jax.training.state import advance, init_state
+from tests.arrays_for_tests import on_device
 
 CONFIG = StylizedFlowConfig(
     flow_steps=2,
@@ -60,7 +61,7 @@ def batch_of(clips=8, frames=20, seed=0):
     pose[:, :, 1, 2] += level
     pose[:, :, 2, 2] -= level
     audio = rng.normal(size=(clips, frames, 4))
-    return Batch(jnp.asarray(audio, jnp.float32), jnp.asarray(pose, jnp.float32))
+    return Batch(on_device(audio, jnp.float32), on_device(pose, jnp.float32))
 
 
 @pytest.fixture(scope="module")
@@ -74,18 +75,21 @@ def trained():
     return state.params, jax.jit(model.summarise)(state.params, jax.random.key(0), batch_of(clips=64, seed=99))
 
 
-heights_of = jax.jit(lambda pose: measure(("height",), DATA, pose))
+MODEL = build(CONFIG, DATA, StylizedFlowSampling())
+
+
+@jax.jit
+def heights(params, summary, given):
+    """Heights of the hands at every frame of a motion; one program for all requests."""
+    pose = MODEL.sample(params, summary, jax.random.key(1), MODEL.condition(params, summary, given), jnp.int32(0))
+    return measure(("height",), DATA, pose[None])[0, :, 0]
 
 
 def generated(trained, *curves, frames=128):
-    """Heights of the hands at every frame of a motion."""
-    model = build(CONFIG, DATA, StylizedFlowSampling(controls=curves))
-    params, summary = trained
-    requests = sampled(parse_curves(curves, ("height",)), 0, frames, DATA.fps)
-    given = Condition(batch_of(clips=1, frames=frames, seed=5).audio[0], controls=jnp.asarray(requests))
-    condition = jax.jit(model.condition)(params, summary, given)
-    pose = jax.jit(model.sample)(params, summary, jax.random.key(1), condition, jnp.int32(0))
-    return np.asarray(heights_of(pose[None])[0, :, 0])
+    """Heights of the hands for requested controls."""
+    audio = batch_of(clips=1, frames=frames, seed=5).audio[0]
+    requests = on_device(sampled(parse_curves(curves, ("height",)), 0, frames, DATA.fps))
+    return np.asarray(heights(*trained, Condition(audio, controls=requests)))
 
 
 def test_hands_follow_the_requested_controls(trained):
@@ -138,7 +142,7 @@ def test_the_share_of_controls_is_that_of_training(trained):
 def test_requested_values_are_the_same_in_any_window():
     curves = parse_curves(("speed=0@1 1@3", "height=0.25"), ("height", "speed"))
     training = jnp.stack([jnp.linspace(0.0, 0.4, 5), jnp.linspace(1.0, 2.0, 5)], axis=-1)
-    values = lambda start, frames: requested(jnp.asarray(sampled(curves, start, frames, 32.0)), training)  # noqa: E731
+    values = lambda start, frames: requested(on_device(sampled(curves, start, frames, 32.0)), training)  # noqa: E731
     whole = values(0, 256)
     parts = [values(start, 128) for start in (0, 128)]
     np.testing.assert_allclose(np.concatenate(parts), whole, atol=1e-6)
@@ -202,8 +206,8 @@ def test_every_preset_of_every_model_can_be_trained_and_moglow_as_published(caps
 
 
 def test_a_gain_stretches_requests_about_the_median_of_the_training_clips():
-    training = jnp.asarray(np.random.default_rng(0).normal(size=(99, 1)), jnp.float32)
-    quantiles = jnp.asarray([[0.5], [0.6], [1.0], [jnp.nan]])
+    training = on_device(np.random.default_rng(0).normal(size=(99, 1)), jnp.float32)
+    quantiles = on_device([[0.5], [0.6], [1.0], [jnp.nan]])
     plain, stretched = requested(quantiles, training), requested(quantiles, training, (2.0,))
     median = np.median(training)
     np.testing.assert_allclose(stretched[:2] - median, 2.0 * (plain[:2] - median), atol=1e-6)
