@@ -15,7 +15,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from a2g_jax.generation.live.stream import Stream
+from a2g_jax.generation.live.stream import HOP, Stream
 from a2g_jax.io.audio import resampled
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import open_run
@@ -47,9 +47,9 @@ def slope(minutes: list[float], values: list[float]) -> float:
     return float(np.polyfit(np.asarray(minutes) / 60, values, 1)[0]) if len(minutes) > 2 else float("nan")
 
 
-def endure(name: str, hours: float, out: Path) -> dict:
+def endure(name: str, hours: float, hop: float, out: Path) -> dict:
     """Push hours of speech through one stream; returns the summary."""
-    stream = Stream(open_run(name), RATE)
+    stream = Stream(open_run(name), RATE, hop=hop)
     stream.warm_up()
     library = speeches()
     rng = np.random.default_rng(1)
@@ -74,6 +74,7 @@ def endure(name: str, hours: float, out: Path) -> dict:
                 "bad": bad,
                 "cpu": round((time.process_time() - start) / 60, 4),
                 "compiled": stream._program.compilations(),
+                "hop": hop,
                 "root": [round(float(value), 4) for value in motion.root[-1]] if motion.frames else None,
             }
             rows.append(row)
@@ -90,6 +91,7 @@ def summary(name: str, rows: list[dict]) -> dict:
     return {
         "run": name,
         "simulated_hours": round(len(rows) / 60, 2),
+        "hop_seconds": rows[-1].get("hop", HOP),
         "resident_mb_first_counted": round(megabytes[0], 1),
         "resident_mb_last": round(megabytes[-1], 1),
         "resident_mb_most": round(max(megabytes), 1),
@@ -111,6 +113,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", default="demo-flow")
     parser.add_argument("--hours", type=float, default=10.0)
+    parser.add_argument("--hop", type=float, default=HOP, help="seconds of motion that a call computes")
     parser.add_argument("--out", type=Path, default=Path("endurance.jsonl"))
     parser.add_argument("--summary", action="store_true", help="of the file, without measuring")
     args = parser.parse_args()
@@ -118,7 +121,7 @@ def main() -> None:
         rows = [json.loads(line) for line in args.out.read_text(encoding="utf-8").splitlines()]
         print(json.dumps(summary(args.run, rows), indent=1))
     else:
-        print(json.dumps(endure(args.run, args.hours, args.out), indent=1))
+        print(json.dumps(endure(args.run, args.hours, args.hop, args.out), indent=1))
 
 
 if __name__ == "__main__":

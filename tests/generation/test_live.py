@@ -183,6 +183,7 @@ def test_a_shorter_lookahead_is_a_shorter_latency():
     assert PoseProgram(run, 3, 0).lookahead == 0
     assert PoseProgram(run, 3, 1000).lookahead == PoseProgram(run, 3).lookahead == 2
     near, far = Stream(run, RATE, lookahead=0.0).latency, Stream(run, RATE).latency
+    assert Stream(run, RATE, hop=1.0).latency.hop > far.hop
     assert near.total == pytest.approx(far.total - 2 / 30)
 
 
@@ -219,6 +220,7 @@ def test_integers_are_scaled(stream):
         ({"seed": -1}, "seed: expected"),
         ({"lookahead": -1.0}, "lookahead: expected"),
         ({"lookahead": float("nan")}, "lookahead: expected"),
+        ({"hop": 0.0}, "hop: expected"),
         ({"temprature": 1.0}, "no sampling setting 'temprature'"),
         ({"temperature": -1.0}, "temperature: expected"),
     ],

@@ -63,6 +63,7 @@ class Stream:
         seed: int = 0,
         *,
         lookahead: float | None = None,
+        hop: float = HOP,
         **sampling: Any,
     ) -> None:
         """
@@ -72,6 +73,7 @@ class Stream:
             lookahead: seconds of speech after its own that a frame waits for; None for all that the model depends on.
                 With less, the present sound stands for what has not been said yet: lower latency, and motion that
                 follows the speech less closely.
+            hop: seconds of motion that are computed at a time; more cost less computing and wait longer.
             sampling: sampling settings of the model in place of those of the run, such as ``temperature=0.8``.
 
         Raises:
@@ -82,10 +84,12 @@ class Stream:
             run = replace(run, config=run.config.with_sampling(**sampling))
         if lookahead is not None and not 0 <= lookahead < float("inf"):
             raise InputError(f"lookahead: expected seconds, 0 or more; got {lookahead}.")
+        if not 0 < hop < float("inf"):
+            raise InputError(f"hop: expected seconds above 0; got {hop}.")
         fps = run.config.fps
         ahead = None if lookahead is None else round(lookahead * fps)
         self.run, self.sample_rate, self._seed = run, check_rate(sample_rate), _seed(seed)
-        self._program = PoseProgram(run, max(1, round(HOP * fps)), ahead)
+        self._program = PoseProgram(run, max(1, round(hop * fps)), ahead)
         self._start()
 
     @property
