@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 from a2g_jax.errors import InputError
+from a2g_jax.io.locks import locked
 from experiments.tables.jobs import JOBS, PAPERS, Job, ready
 
 #: Seconds between two looks at running commands.
@@ -56,8 +57,9 @@ def main() -> None:
         return
     if options.work is None:
         raise InputError("--work: expected a folder for corpora and runs.")
-    if options.at_once < 1:
-        raise InputError(f"--at-once: expected 1 or more; got {options.at_once}.")
+    cores = os.cpu_count() or 1
+    if not 1 <= options.at_once <= cores:
+        raise InputError(f"--at-once: expected a number from 1 to {cores}, the cores here; got {options.at_once}.")
     sys.exit(run(jobs, work.resolve(), options.at_once))
 
 
@@ -67,39 +69,55 @@ def run(jobs: Sequence[Job], work: Path, at_once: int) -> int:
     After a failure, jobs that need the failed one are left out and the others continue.
     """
     (work / "logs").mkdir(parents=True, exist_ok=True)
+    with locked(work / ".lock", f"{work}: tables are being made there"):
+        running: list[Running] = []
+        ends = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+        before = {number: signal.signal(number, signal.default_int_handler) for number in ends}
+        try:
+            return _run(jobs, work, at_once, running)
+        except KeyboardInterrupt:
+            print("interrupted; the same command resumes", flush=True)
+            return 130
+        finally:
+            _stop(running)
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _run(jobs: Sequence[Job], work: Path, at_once: int, running: list[Running]) -> int:
     done = {job.name for job in jobs if job.finished(work)}
     begun, failed = set(done), []
-    running: list[Running] = []
-    try:
-        while True:
-            for job in ready(jobs, done, begun)[: at_once - len(running)]:
-                begun.add(job.name)
-                slot = min(set(range(at_once)) - {one.slot for one in running})
-                running.append(_start(job, work, slot, at_once))
-                print(f"{len(begun)} of {len(jobs)}: {job.name} begins", flush=True)
-            if not running:
-                break
-            time.sleep(_WAIT)
-            for one in [one for one in running if one.process.poll() is not None]:
-                running.remove(one)
-                one.log.close()
-                minutes = (time.monotonic() - one.began) / 60
-                if one.process.returncode == 0:
-                    done.add(one.job.name)
-                    print(f"{one.job.name}: {minutes:.1f} minutes", flush=True)
-                else:
-                    failed.append(one.job.name)
-                    print(f"{one.job.name}: failed after {minutes:.1f} minutes:\n{_end(one.log)}", flush=True)
-    except KeyboardInterrupt:
-        for one in running:
-            one.process.send_signal(signal.SIGINT)
-        for one in running:
-            one.process.wait()
-        print("interrupted; the same command resumes")
-        return 130
+    while True:
+        for job in ready(jobs, done, begun, {one.job.name for one in running})[: at_once - len(running)]:
+            begun.add(job.name)
+            slot = min(set(range(at_once)) - {one.slot for one in running})
+            running.append(_start(job, work, slot, at_once))
+            print(f"{len(begun)} of {len(jobs)}: {job.name} begins", flush=True)
+        if not running:
+            break
+        time.sleep(_WAIT)
+        for one in [one for one in running if one.process.poll() is not None]:
+            running.remove(one)
+            one.log.close()
+            minutes = (time.monotonic() - one.began) / 60
+            if one.process.returncode == 0:
+                done.add(one.job.name)
+                print(f"{one.job.name}: {minutes:.1f} minutes", flush=True)
+            else:
+                failed.append(one.job.name)
+                print(f"{one.job.name}: failed after {minutes:.1f} minutes:\n{_end(one.log)}", flush=True)
     if left := [job.name for job in jobs if job.name not in begun]:
         print(f"not begun, since they need what failed: {', '.join(left)}")
     return 1 if failed else 0
+
+
+def _stop(running: Sequence[Running]) -> None:
+    """Interrupt what runs, and wait until its checkpoints are written."""
+    for one in running:
+        one.process.send_signal(signal.SIGINT)
+    for one in running:
+        one.process.wait()
+        one.log.close()
 
 
 def _start(job: Job, work: Path, slot: int, at_once: int) -> Running:

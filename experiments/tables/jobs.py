@@ -8,6 +8,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from a2g_jax.training.run_file import RUN_FILE, read_description
+
 _FEATURES = "experiments/features"
 _EMOTION = "--features emotion-gesture --equal-emotions --languages invented,en"
 
@@ -23,6 +25,8 @@ class Job(NamedTuple):
     """Names of the jobs before it."""
     makes: str = ""
     """File below the work folder that exists once the job is finished; empty for tables, which resume themselves."""
+    steps: int = 0
+    """Training steps that the description of a run states once the job is finished; 0 for no training."""
 
     def arguments(self, work: Path) -> list[str]:
         """The arguments with their folders."""
@@ -30,24 +34,29 @@ class Job(NamedTuple):
         return [argument.format(**places) for argument in self.command.split()]
 
     def finished(self, work: Path) -> bool:
-        """Whether what it makes exists."""
-        return bool(self.makes) and (work / self.makes).is_file()
+        """Whether what it makes is there, and whole."""
+        if not self.makes or not (work / self.makes).is_file():
+            return False
+        # Runs have weights from their first checkpoint on.
+        return not self.steps or read_description(work / self.name).get("steps") == self.steps
 
 
 def _corpus(name: str, paper: str, flags: str) -> Job:
     return Job(name, paper, f"a2g_jax.cli prepare talker --out {{work}}/{name} {flags}", (), f"{name}/manifest.json")
 
 
-def _network(name: str, paper: str, model: str, corpus: str, flags: str) -> Job:
-    command = f"a2g_jax.cli train {model} --corpus {{work}}/{corpus} --out {{work}}/{name} --resume {flags}"
-    return Job(name, paper, command, (corpus,), f"{name}/weights.safetensors")
+def _network(name: str, paper: str, model: str, corpus: str, steps: int, flags: str) -> Job:
+    command = (
+        f"a2g_jax.cli train {model} --corpus {{work}}/{corpus} --out {{work}}/{name} --resume --steps {steps} {flags}"
+    )
+    return Job(name, paper, command, (corpus,), f"{name}/{RUN_FILE}", steps)
 
 
 def _audio2gestures() -> Iterable[Job]:
     paper = "audio2gestures"
     yield _corpus("talk", paper, "--minutes 90 --seed 6")
     yield _corpus("talk_2d", paper, "--minutes 60 --seed 6 --view s2g --features audio2gestures-2d")
-    yield _network("talk_loss", paper, "motion_autoencoder", "talk", "--steps 2000 --seed 1")
+    yield _network("talk_loss", paper, "motion_autoencoder", "talk", 2000, "--seed 1")
     scored = "--corpus {work}/talk --features {features}/talker --runs {runs}"
     for number in range(1, 7):
         flags, needs = scored, ("talk",)
@@ -64,9 +73,9 @@ def _stylized_flow() -> Iterable[Job]:
     paper = "stylized_flow"
     yield _corpus("flow", paper, "--minutes 90 --seed 6 --features stylized-flow")
     yield _corpus("ted", paper, "--minutes 90 --seed 6 --view ted --features stylized-flow-ted")
-    yield _network("flow_score", paper, "motion_autoencoder", "flow", "--steps 2000 --clip-frames 47")
-    yield _network("flow_loss", paper, "motion_autoencoder", "flow", "--steps 2000 --clip-frames 47 --seed 1")
-    yield _network("ted_loss", paper, "motion_autoencoder", "ted", "--steps 2000 --clip-frames 30 --seed 1")
+    yield _network("flow_score", paper, "motion_autoencoder", "flow", 2000, "--clip-frames 47")
+    yield _network("flow_loss", paper, "motion_autoencoder", "flow", 2000, "--clip-frames 47 --seed 1")
+    yield _network("ted_loss", paper, "motion_autoencoder", "ted", 2000, "--clip-frames 30 --seed 1")
     ted = "{work}/ted", "{features}/talker_ted", "{work}/ted_loss"
     trinity = "--corpus {work}/flow --features {work}/flow_score --perceptual {work}/flow_loss"
     both = f"{trinity} --corpus-ted {ted[0]} --features-ted {ted[1]} --perceptual-ted {ted[2]} --runs {{runs}}"
@@ -83,9 +92,8 @@ def _emotion_gesture() -> Iterable[Job]:
     yield _corpus("emotions", paper, f"--minutes 240 --seed 5 {_EMOTION}")
     yield _corpus("others", paper, f"--minutes 160 --seed 9 {_EMOTION}")
     yield _corpus("jittered", paper, f"--minutes 240 --seed 5 --jitter 2 {_EMOTION}")
-    clips = "--clip-frames 50"
-    yield _network("judge", paper, "emotion_classifier", "others", f"--steps 800 --batch-size 32 {clips}")
-    yield _network("emotion_features", paper, "motion_autoencoder", "others", f"--steps 1500 {clips}")
+    yield _network("judge", paper, "emotion_classifier", "others", 800, "--batch-size 32 --clip-frames 50")
+    yield _network("emotion_features", paper, "motion_autoencoder", "others", 1500, "--clip-frames 50")
     own = "--corpus {work}/emotions --runs {runs}"
     scored = f"{own} --features {{work}}/emotion_features --judge {{work}}/judge"
     needs = ("emotions", "emotion_features", "judge")
@@ -106,12 +114,12 @@ JOBS: tuple[Job, ...] = (*_audio2gestures(), *_stylized_flow(), *_emotion_gestur
 PAPERS = tuple(dict.fromkeys(job.paper for job in JOBS))
 
 
-def ready(jobs: Sequence[Job], done: set[str], begun: set[str]) -> list[Job]:
+def ready(jobs: Sequence[Job], done: set[str], begun: set[str], running: set[str]) -> list[Job]:
     """Jobs that can begin: not begun yet, with all that they need done; tables of one paper one at a time.
 
     Tables of a paper take records from each other, and two at once would train the same row twice.
     """
-    busy = {job.paper for job in jobs if job.name in begun - done and not job.makes}
+    busy = {job.paper for job in jobs if job.name in running and not job.makes}
     found = []
     for job in jobs:
         if job.name in begun or not set(job.needs) <= done:

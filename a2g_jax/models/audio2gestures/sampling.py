@@ -27,8 +27,8 @@ class Audio2GesturesSampling:
     keep_specific: int | None = None
     """Lowest DCT bands of the specific code that are kept, before other edits; all if not set."""
     rest_smoothing: int = 0
-    """Binomial filters over values that hardly change, fewer the faster they do; hands then come to rest and strokes
-    stay quick. 0 smooths all frames alike, as in training."""
+    """Binomial filters over values that hardly change, fewer the faster they do, for calmer pauses and quicker strokes;
+    0 smooths all frames alike, as in training."""
     rest_speed: float = 2.4
     """Speed of a value at which half of that smoothing is left, in standard deviations of training motion a second."""
     edits: tuple[str, ...] = field(default=(), metadata={"flag": "edit", "repeat": True})
