@@ -96,22 +96,20 @@ def export(
     figures: list[Figure] = []
     speech = (audio, run.config.mel.sample_rate)
     with MotionFiles(out, ("sample",), formats, REPORTS, speech=speech, writers=delivery.writers()) as files:
-        done = 0
         try:
-            for done, motion in enumerate(motions, start=1):
+            for number, motion in enumerate(motions):
                 made = delivery.make(motion)
-                files.write(done - 1, made.shown, own=made.by_format(delivery.own_format))
+                files.write(number, made.shown, own=made.by_format(delivery.own_format))
+                findings = checked.reports[number].findings
                 if scorer is not None:
-                    ranked.append(scorer.score(done - 1, motion, checked.reports[done - 1].findings))
+                    ranked.append(scorer.score(number, motion, findings))
                 if PAGE in formats:
-                    findings = checked.reports[done - 1].findings
-                    names = files.names(done - 1)
-                    figure = checked_figure(made.shown, f"sample {done - 1}", findings, files=names)
-                    figures.append(replace(figure, number=done - 1))
+                    figure = checked_figure(made.shown, f"sample {number}", findings, files=files.names(number))
+                    figures.append(replace(figure, number=number))
                 if not checked.strict:
-                    report(done)
+                    report(number + 1)
         finally:
-            if done:  # motions before one that is refused stay, with the findings on all
+            if any(files.folder.iterdir()):  # files before an error stay, with the findings on all motions
                 ranked = [] if scorer is None else best_first(ranked)
                 write_json(files.folder / "checks.json", checked.to_json() | _order_to_json(ranked))
         if scores is not None:

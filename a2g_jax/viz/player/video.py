@@ -5,8 +5,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,7 +17,7 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.files import atomic_path
-from a2g_jax.progress import checkpoint
+from a2g_jax.progress import counted_steps
 from a2g_jax.viz.player.figure import Figure
 from a2g_jax.viz.player.page import write_page
 from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
@@ -92,6 +92,7 @@ def write_video(
     Raises:
         InputError: a program is missing or fails, or the film would be too long.
         OutputError: the file cannot be written.
+        KeyboardInterrupt: Ctrl-C; nothing is left of the film.
     """
     check_video()
     if motion.frames > MOST_FRAMES:
@@ -104,16 +105,20 @@ def write_video(
         if sound.size:
             speech = Path(folder) / "speech.wav"
             write_audio(speech, sound, sample_rate)
-        with _encoder(temporary, motion.fps, speech) as pictures:
-            drawn = page_pictures(page, np.arange(motion.frames) / motion.fps, script=_NEAR)
-            for done, picture in enumerate(drawn, start=1):
+        times = np.arange(motion.frames) / motion.fps
+        with (
+            _encoder(temporary, motion.fps, speech) as pictures,
+            counted_steps(motion.frames, f"drawing {Path(path).name}", "frame") as step,
+            closing(page_pictures(page, times, script=_NEAR)) as drawn,
+        ):
+            for picture in drawn:
                 pictures.write(picture)
-                checkpoint(done, motion.frames, "frame")
+                step()
 
 
 def page_pictures(
     page: Path, times: Iterable[float], width: int = SIZE, height: int = SIZE, script: str = ""
-) -> Iterator[bytes]:
+) -> Generator[bytes, None, None]:
     """The figures of a page at some moments, as JPEG.
 
     Args:
@@ -127,7 +132,10 @@ def page_pictures(
 
     with sync_playwright() as playwright:
         try:
-            browser = playwright.chromium.launch(executable_path=find_browser(), args=list(BROWSER_ARGUMENTS))
+            # Ctrl-C reaches this process, which closes the browser itself.
+            browser = playwright.chromium.launch(
+                executable_path=find_browser(), args=list(BROWSER_ARGUMENTS), handle_sigint=False
+            )
             try:
                 view = browser.new_page(viewport={"width": width // 2, "height": height // 2}, color_scheme="light")
                 view.goto(page.resolve().as_uri())
