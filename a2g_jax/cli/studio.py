@@ -152,6 +152,7 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
     """
     from a2g_jax.generation.checked import Checked
     from a2g_jax.generation.export import describe_findings, export, requested
+    from a2g_jax.generation.ranking import read_scores
     from a2g_jax.io.audio import write_audio
     from a2g_jax.serving.studio.takes import SPEECH, Outcome
 
@@ -187,19 +188,11 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         lanes=tuple(lanes),
         notes=tuple(note for note, _ in described),
         tracks=tuple(tracks for _, tracks in described),
-        scores=_scores(folder),
+        scores=tuple(one.score for one in sorted(read_scores(folder))),
         lines=tuple(filter(None, (*ready.lines, *checked.lines(), *ready.report(folder)))),
         plain=checked.plain(),
         warning=ready.warning,
     )
-
-
-def _scores(folder: Path) -> tuple[float, ...]:
-    """The scores of the samples by number; empty where they have none."""
-    from a2g_jax.io.files import read_json
-
-    rows = read_json(folder / "checks.json").get("scores", ())
-    return tuple(float(row["score"]) for row in sorted(rows, key=lambda row: row["sample"]))
 
 
 def _opened(name: str) -> "Run":

@@ -38,7 +38,6 @@ def export(
     sample_rate: int | None = None,
     delivery: Delivery = PLAIN,
     order: str = "number",
-    scores: "list[Score] | None" = None,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
@@ -64,8 +63,8 @@ def export(
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
         delivery: the character and the frame rate to write for. Motions are checked before, on the run's skeleton.
         order: of the figures on the page, by number, or ``"best"`` first (:mod:`a2g_jax.generation.ranking`); then
-            ``checks.json`` has order and scores. Files keep their names.
-        scores: a list that the scores are put into, best first.
+            ``checks.json`` has order and scores, which :func:`~a2g_jax.generation.ranking.read_scores` reads. Files
+            keep their names.
 
     Returns:
         How many files of each format were written.
@@ -96,24 +95,23 @@ def export(
     figures: list[Figure] = []
     speech = (audio, run.config.mel.sample_rate)
     with MotionFiles(out, ("sample",), formats, REPORTS, speech=speech, writers=delivery.writers()) as files:
+        done = 0
         try:
             for number, motion in enumerate(motions):
                 made = delivery.make(motion)
                 files.write(number, made.shown, own=made.by_format(delivery.own_format))
-                findings = checked.reports[number].findings
+                done, findings = number + 1, checked.reports[number].findings
                 if scorer is not None:
                     ranked.append(scorer.score(number, motion, findings))
                 if PAGE in formats:
                     figure = checked_figure(made.shown, f"sample {number}", findings, files=files.names(number))
                     figures.append(replace(figure, number=number))
                 if not checked.strict:
-                    report(number + 1)
+                    report(done)
         finally:
-            if any(files.folder.iterdir()):  # files before an error stay, with the findings on all motions
+            if done or any(files.folder.iterdir()):  # files before an error stay, with the findings on all motions
                 ranked = [] if scorer is None else best_first(ranked)
                 write_json(files.folder / "checks.json", checked.to_json() | _order_to_json(ranked))
-        if scores is not None:
-            scores[:] = ranked
         if figures:
             figures = [_scored(figures[one.sample], one) for one in ranked] or figures
             write_page(

@@ -2,21 +2,22 @@
 
 import threading
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.formats import PAGE, check_page_size, known_formats, motion_format
+from a2g_jax.generation.formats import check_page_size, motion_format
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.files import atomic_path, json_text
 from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.io.temporary import remove
 from a2g_jax.io.words import Word
-from a2g_jax.plugins import load_object
 from a2g_jax.serving.studio.jobs import DONE, ENDED, Job
+from a2g_jax.serving.studio.sample_formats import formats, slow_formats
 from a2g_jax.serving.studio.settings import Request, named
 from a2g_jax.serving.studio.uploads import Upload
 from a2g_jax.viz.player import Figure, Lane, Track
@@ -71,6 +72,7 @@ class Take:
     films: dict[tuple[int, str], Job] = field(default_factory=dict)
     """Jobs of slow formats by sample and format."""
     _writing: threading.Lock = field(default_factory=threading.Lock)
+    _removed: bool = False
 
     @property
     def id(self) -> str:
@@ -131,10 +133,30 @@ class Take:
         assert found is not None
         path = self.folder / f"sample_{sample:02d}{found.suffix}"
         # Slow ones are written by the one worker, and must not keep the others waiting.
-        with nullcontext() if found.check else self._writing:
+        with nullcontext() if found.check else self._writing, self.working():
             if not path.exists():
                 found.write(path, self.motion(sample), self.speech() if found.sound else None)
         return path
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        """A block that writes into the folder: if the take is removed meanwhile, so is what the block wrote.
+
+        Raises:
+            InputError: the take is removed.
+        """
+        try:
+            yield
+        finally:
+            if self._removed:
+                remove(self.folder)
+        if self._removed:
+            raise InputError("this take is no longer kept; generate it again.")
+
+    def remove(self) -> None:
+        """Remove the files; work that has not ended yet leaves none either."""
+        self._removed = True
+        remove(self.folder)
 
     def file_name(self, sample: int, format: str) -> str:
         """The name that a downloaded file gets."""
@@ -230,29 +252,6 @@ class Take:
 
 #: Sample rate of a take's speech, Hz: that of the models.
 SPEECH_RATE = 16_000
-
-
-def formats() -> tuple[str, ...]:
-    """Formats of a sample's files."""
-    return tuple(name for name in known_formats() if name != PAGE)
-
-
-def slow_formats() -> tuple[str, ...]:
-    """Formats that other programs write, which takes minutes: they are jobs."""
-    return tuple(name for name in formats() if (found := motion_format(name)) is not None and found.check)
-
-
-def missing_programs() -> dict[str, str]:
-    """Why formats cannot be written here, by format."""
-    reasons = {}
-    for name in slow_formats():
-        found = motion_format(name)
-        assert found is not None
-        try:
-            load_object(found.check, "check")()
-        except InputError as error:
-            reasons[name] = str(error)
-    return reasons
 
 
 def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
