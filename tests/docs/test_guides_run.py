@@ -59,6 +59,11 @@ NOT_HERE = {
 MODULES = ("def build(", "ENTRY", "DATASET", "MotionFormat", "Metric(", "def write_csv", "LinearConfig")
 #: The smallest trainings and corpora.
 SMALL = ["--steps", "4", "--batch-size", "2", "--log-every", "2", "--validate-every", "4", "--checkpoint-every", "4"]
+#: Further stages of a model, whose steps are settings of their own.
+SMALL_STAGES = {
+    "audio2gestures": ["--adversarial-steps", "2"],
+    "emotion_gesture": ["--mining-steps", "2", "--vae-steps", "2", "--sampled-steps", "2"],
+}
 
 
 @pytest.fixture(scope="module")
@@ -101,8 +106,7 @@ def shortened(words):
     """The call with a small training or corpus."""
     if words[0] == "train" and "--settings" not in words and "--resume" not in words:
         words = re.sub(r" --(steps|batch-size) \d+", "", " ".join(words)).split()
-        gan = ["--adversarial-steps", "2"] if words[1] == "audio2gestures" and "--from" not in words else []
-        return [*words, *SMALL, *gan]
+        return [*words, *SMALL, *([] if "--from" in words else SMALL_STAGES.get(words[1], []))]
     if "--minutes" in words:
         words[words.index("--minutes") + 1] = "1"
     if words[0] == "evaluate" and "--samples" not in words and "--compare" not in words:

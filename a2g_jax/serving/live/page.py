@@ -17,7 +17,7 @@ from a2g_jax.serving.live.session import live
 from a2g_jax.viz.player.page import fill_template, scripts, style
 
 #: Parts of the written page's script that draw, and the page's own.
-_PLAYER = ("math", "figures", "shaders", "webgl", "canvas", "layout", "controls")
+_PLAYER = ("math", "figures", "shaders", "soup", "shadows", "webgl", "canvas", "layout", "controls")
 _OWN = ("live_figure", "live_pace", "live_stage", "live")
 #: Look-ahead of the quick choice on the page, seconds.
 QUICK = 0.5

@@ -27,6 +27,8 @@ _SCRIPTS = (
     "unpack",
     "figures",
     "shaders",
+    "soup",
+    "shadows",
     "webgl",
     "canvas",
     "layout",

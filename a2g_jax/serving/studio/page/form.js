@@ -96,7 +96,7 @@ function fillSettings(settings) {
     if (setting.kind === "bool") input = make("input", { type: "checkbox", checked: setting.value, onchange: () => change(input.checked === setting.value ? null : input.checked) });
     else input = make("input", { type: setting.kind === "str" ? "text" : "number", step: "any", placeholder: usual, oninput: () => change(input.value.trim() === "" ? null : setting.repeat ? input.value.split(";").map((part) => part.trim()).filter(Boolean) : input.value.trim()) });
     return make("div", { class: "setting", "data-part": `settings.${setting.name}` },
-      make("label", { class: setting.kind === "bool" ? "check" : "" }, make("span", {}, setting.name.replaceAll("-", " ")), input), make("p", { class: "hint soft" }, setting.about.replaceAll(/:\w+:`[^`]*`/g, "")), make("p", { class: "error", role: "alert" }));
+      make("label", { class: setting.kind === "bool" ? "check" : "" }, make("span", {}, setting.name.replaceAll("-", " ")), input), make("p", { class: "hint soft" }, setting.about.replaceAll(/ \(:\w+:`[^`]*`\)|:\w+:`[^`]*`/g, "")), make("p", { class: "error", role: "alert" }));
   }));
 }
 

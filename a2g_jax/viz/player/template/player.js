@@ -29,6 +29,7 @@ class Player {
     new ResizeObserver(() => { this.stale = true; this.wake(); }).observe(this.element("stage"));
     new ResizeObserver(() => this.wake()).observe(this.element("panel"));
     this.stale = true;
+    this.pictures = 0;
     this.clock = performance.now();
     this.ready = new Promise((done) => { this.opened = done; });
     this.wake();
@@ -148,6 +149,7 @@ class Player {
     if (still) this.renderer.scale = this.renderer.software && ratio < 2 ? 2 : 1;
     this.renderer.render({ bands: this.bands, width, height, ratio, theme, yaw: this.camera.yaw, overlay: this.overlay, still });
     this.renderer.scale = moving;
+    this.pictures += 1;
     this.placeLabels(width, height);
     this.timeline.draw();
     this.showClock();
@@ -327,6 +329,8 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
+  pictures: () => player.pictures,
+  scale: () => player.renderer.scale,
   speech: () => player.speech,
   // The tooltip of a position in the detailed timeline, in CSS pixels from its corner; lanes from top to bottom.
   tell: (x, y) => player.timeline.tell(x, y) || null,
