@@ -13,6 +13,7 @@ from a2g_jax.geometry.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from a2g_jax.io.character import Character
+    from a2g_jax.viz.player.skin import Skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,22 @@ class Delivery:
             return Made(facing(motion, self.direction))
         own = retarget(motion, self._matched(motion.skeleton))
         return Made(upright_motion(own, self.character.rig, self.character.metres), own)
+
+    def skin(self, skeleton: Skeleton) -> "Skin | None":
+        """The character's mesh for pages, on the skeleton of motions that are shown; None without a character or a mesh
+        that can be read.
+
+        Raises:
+            InputError: the mesh is damaged.
+        """
+        if self.character is None:
+            return None
+        if "skin" not in self._kept:
+            from a2g_jax.viz.player.skin import make_skin
+
+            self._kept["skin"] = make_skin(skeleton, self.character.surfaces())
+        found: Skin | None = self._kept["skin"]
+        return found
 
     def _matched(self, skeleton: Skeleton) -> Match:
         # All motions of a run have the same skeleton; its rig is found once.

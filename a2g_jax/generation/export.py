@@ -105,7 +105,7 @@ def export(
                     ranked.append(scorer.score(number, motion, findings))
                 if PAGE in formats:
                     figure = checked_figure(made.shown, f"sample {number}", findings, files=files.names(number))
-                    figures.append(replace(figure, number=number))
+                    figures.append(replace(figure, number=number, skin=delivery.skin(made.shown.skeleton)))
                 if not checked.strict:
                     report(done)
         finally:

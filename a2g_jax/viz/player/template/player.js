@@ -1,9 +1,9 @@
 // The player: one clock (the audio), one camera, all figures.
 
 class Player {
-  constructor(data, positions, speech) {
+  constructor(data, positions, meshes, speech) {
     this.element = (id) => document.getElementById(id);
-    this.figures = data.figures.map((figure, index) => new Figure(figure, positions[index], index));
+    this.figures = data.figures.map((figure, index) => new Figure(figure, positions[index], index, meshes[figure.mesh]));
     this.words = data.words;
     this.lanes = data.lanes;
     this.speech = speech;
@@ -142,7 +142,7 @@ class Player {
       band.figures = band.members.map((index, k) => {
         const figure = this.figures[index];
         figure.update(this.now, this.camera.yaw, band.slots[k], theme, this.trails);
-        return { capsules: figure.capsules, count: figure.count, shapes: figure.shapeList.length, thick: figure.thick, shaders: figure.shaders };
+        return figure.drawn;
       });
     }
     const ratio = Math.min(window.devicePixelRatio || 1, 2), moving = this.renderer.scale;
@@ -303,12 +303,12 @@ class Player {
 }
 
 async function open(data) {
-  const unpacked = Promise.all(data.figures.map(unpackPositions));
+  const unpacked = Promise.all(data.figures.map(unpackPositions)), meshes = Promise.all(data.meshes.map(unpackMesh));
   const speech = await unpackSpeech(data.audio).catch((error) => {
     console.warn("This browser cannot decode the speech; the figures move without it:", error.message);
     return null;
   });
-  return new Player(data, await unpacked, speech);
+  return new Player(data, await unpacked, await meshes, speech);
 }
 
 let player = null;
@@ -329,6 +329,7 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
+  vertices: (index = 0) => Array.from(player.figures[index].mesh.places),
   pictures: () => player.pictures,
   scale: () => player.renderer.scale,
   speech: () => player.speech,
