@@ -107,6 +107,8 @@ def shortened(words):
     if words[0] == "train" and "--settings" not in words and "--resume" not in words:
         words = re.sub(r" --(steps|batch-size) \d+", "", " ".join(words)).split()
         return [*words, *SMALL, *([] if "--from" in words else SMALL_STAGES.get(words[1], []))]
+    if words[0] == "train" and "--resume" in words and "--steps" in words:
+        words[words.index("--steps") + 1] = "6"  # two more than the others
     if "--minutes" in words:
         words[words.index("--minutes") + 1] = "1"
     if words[0] == "evaluate" and "--samples" not in words and "--compare" not in words:

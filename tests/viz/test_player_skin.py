@@ -116,7 +116,9 @@ def test_compressed_meshes_are_left_to_our_figure(tmp_path):
         part["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}}
     write_glb(tmp_path / "draco.glb", glb.document, glb.binary)
     assert read_character(tmp_path / "draco.glb").surfaces() == []
-    assert make_skin(talk(2.0, 1).motion.skeleton, []) is None
+    delivery = Delivery(character=read_character(tmp_path / "draco.glb"))
+    assert delivery.skin(delivery.character.rig.skeleton) is None
+    assert ["its mesh is compressed; the page shows our figure" in line for line in delivery.lines()] == [True]
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from a2g_jax.serving.studio.settings import Request, named
 from a2g_jax.serving.studio.uploads import Upload
 from a2g_jax.viz.player import Figure, Lane, Track
 from a2g_jax.viz.player.page import page_html
+from a2g_jax.viz.player.skin import Skin
 
 #: The speech of a take, in its folder.
 SPEECH = "speech.wav"
@@ -50,6 +51,8 @@ class Outcome:
     """The most important one in plain words; the page shows the others on request."""
     warning: str = ""
     """About the speech; shown at once."""
+    skin: Skin | None = None
+    """The mesh of the character that it was generated for."""
 
 
 #: Generates: the arguments of ``a2g generate``, the folder, and the job that progress is reported to.
@@ -172,7 +175,8 @@ class Take:
         outcome = self.outcome
         note = outcome.notes[sample] if sample < len(outcome.notes) else ""
         tracks = outcome.tracks[sample] if sample < len(outcome.tracks) else ()
-        return Figure(self.motion(sample), label or f"sample {sample}", note, tracks, number=number)
+        motion = self.motion(sample)
+        return Figure(motion, label or f"sample {sample}", note, tracks, number=number, skin=outcome.skin)
 
     def order(self, by: str = "made") -> list[int]:
         """Samples in an order: ``made``, ``stars`` or ``score``, the best first."""
