@@ -152,7 +152,7 @@ class Mannequin:
                 end = None
         level = np.array([0.0, 1.0, 0.0])
         if up @ level > _UPRIGHT:
-            # Backs lean, and the tops of heads are not above their joints: at rest the face is nearly level nevertheless.
+            # Backs lean, and tops of heads are not above their joints: at rest the face is nearly level nevertheless.
             # It is a little raised, as people whose heads are lowered look up with their eyes, and these cannot turn.
             front = np.cross(self.left, level)
             up, end = np.cos(_RAISED) * level - np.sin(_RAISED) * front, None
