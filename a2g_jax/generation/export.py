@@ -99,13 +99,14 @@ def export(
         try:
             for number, motion in enumerate(motions):
                 made = delivery.make(motion)
-                files.write(number, made.shown, own=made.by_format(delivery.own_format))
+                skin = delivery.skin(made.shown.skeleton) if PAGE in formats or files.drawn else None
+                files.write(number, made.shown, own=made.by_format(delivery.own_format), skin=skin)
                 done, findings = number + 1, checked.reports[number].findings
                 if scorer is not None:
                     ranked.append(scorer.score(number, motion, findings))
                 if PAGE in formats:
                     figure = checked_figure(made.shown, f"sample {number}", findings, files=files.names(number))
-                    figures.append(replace(figure, number=number, skin=delivery.skin(made.shown.skeleton)))
+                    figures.append(replace(figure, number=number, skin=skin))
                 if not checked.strict:
                     report(done)
         finally:

@@ -339,7 +339,7 @@ def test_films_wait_in_the_queue_and_can_be_cancelled(client, studio, monkeypatc
     take = generate(client, studio)
     reached = threading.Event()
 
-    def film(path, motion, audio, rate):
+    def film(path, motion, audio, rate, skin=None):
         for frame in range(10_000):
             reached.set()
             checkpoint(frame + 1, 10_000, "frame")

@@ -19,14 +19,8 @@ from a2g_jax.serving.studio.jobs import DONE, Job, Jobs
 from a2g_jax.serving.studio.readers import KINDS
 from a2g_jax.serving.studio.sample_formats import formats, missing_programs, slow_formats
 from a2g_jax.serving.studio.settings import MOST_SAMPLES, Request, field_of, read_request
-from a2g_jax.serving.studio.takes import (
-    MOST_STARS,
-    Generate,
-    Outcome,
-    Take,
-    takes_page,
-    with_client_names,
-)
+from a2g_jax.serving.studio.takes import MOST_STARS, Generate, Outcome, Take, with_client_names
+from a2g_jax.serving.studio.takes_page import takes_page
 from a2g_jax.serving.studio.uploads import Kind, Upload, Uploads
 
 #: Takes that are kept; the oldest without stars make room, then the oldest.

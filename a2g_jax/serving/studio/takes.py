@@ -2,14 +2,14 @@
 
 import threading
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.formats import check_page_size, motion_format
+from a2g_jax.generation.formats import motion_format
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.files import atomic_path, json_text
@@ -21,7 +21,6 @@ from a2g_jax.serving.studio.sample_formats import formats, slow_formats
 from a2g_jax.serving.studio.settings import Request, named
 from a2g_jax.serving.studio.uploads import Upload
 from a2g_jax.viz.player import Figure, Lane, Track
-from a2g_jax.viz.player.page import page_html
 from a2g_jax.viz.player.skin import Skin
 
 #: The speech of a take, in its folder.
@@ -138,7 +137,8 @@ class Take:
         # Slow ones are written by the one worker, and must not keep the others waiting.
         with nullcontext() if found.check else self._writing, self.working():
             if not path.exists():
-                found.write(path, self.motion(sample), self.speech() if found.sound else None)
+                speech = self.speech() if found.sound else None
+                found.write(path, self.motion(sample), speech, self.outcome.skin)
         return path
 
     @contextmanager
@@ -256,37 +256,6 @@ class Take:
 
 #: Sample rate of a take's speech, Hz: that of the models.
 SPEECH_RATE = 16_000
-
-
-def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
-    """The page of samples side by side, of one take or several of the same speech: that of ``a2g generate``.
-
-    Raises:
-        InputError: no samples, samples of different speeches, or too many for a browser.
-    """
-    chosen = list(shown)
-    if not chosen:
-        raise InputError("choose samples to look at.")
-    takes = list(dict.fromkeys(take for take, _ in chosen))
-    if len({take.request.speech.id for take in takes}) > 1:
-        raise InputError("samples of different speeches cannot be played together; choose takes of one speech.")
-    first, several = takes[0], len(takes) > 1
-    label = "take {}, sample {}" if several else "sample {1}"
-    figures = [
-        take.figure(sample, label.format(take.number, sample), None if several else sample) for take, sample in chosen
-    ]
-    longest = max(figures, key=lambda figure: figure.motion.frames * figure.motion.skeleton.joints).motion
-    check_page_size(len(figures), longest.frames, longest.skeleton.joints)
-    audio, rate = first.speech()
-    return page_html(
-        figures,
-        audio,
-        rate,
-        title=title,
-        subtitle="" if several else first.outcome.subtitle,
-        words=first.words,
-        lanes=[lane for take in takes for lane in take.outcome.lanes],
-    )
 
 
 def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:

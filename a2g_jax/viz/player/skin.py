@@ -44,7 +44,7 @@ class Skin:
             rotations: local.
             root: place of the first joint.
         """
-        motion = Motion(np.float32(rotations)[None], np.float32(root)[None], self.skeleton, 1.0)
+        motion = Motion(np.asarray(rotations, np.float32)[None], np.asarray(root, np.float32)[None], self.skeleton, 1.0)
         turns = motion.world_rotations()[0].astype(np.float64)
         shifts = motion.positions()[0] - np.einsum("jab,jb->ja", turns, rest_positions(self.skeleton))
         places, normals = np.zeros_like(self.places), np.zeros_like(self.normals)
@@ -188,7 +188,7 @@ def bind(skin: Skin, motions: Sequence[Motion] = ()) -> Bound:
         held = np.where(moves[:, None, None], held, first)
     owner = [next(one for one in (joint, *ancestors(parents, joint)) if moves[one]) for joint in range(count)]
     posed = skin.posed(held, np.zeros(3))
-    still = Motion(np.float32(held)[None], np.zeros((1, 3), np.float32), skin.skeleton, 1.0)
+    still = Motion(np.asarray(held, np.float32)[None], np.zeros((1, 3), np.float32), skin.skeleton, 1.0)
     owned = np.where(skin.weights > 0, np.asarray(owner)[skin.joints], 0)
     joints, bones = np.unique(owned, return_inverse=True)
     bound = replace(posed, joints=bones.reshape(skin.joints.shape))

@@ -21,6 +21,7 @@ from a2g_jax.progress import counted_steps
 from a2g_jax.viz.player.figure import Figure
 from a2g_jax.viz.player.page import write_page
 from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
+from a2g_jax.viz.player.skin import Skin
 
 #: Width and height of the picture, pixels. The page draws stills at twice the pixels of its window without a GPU.
 SIZE = 720
@@ -81,13 +82,18 @@ def check_video() -> None:
 
 
 def write_video(
-    path: str | os.PathLike[str], motion: Motion, audio: Float[np.ndarray, " N"] | tuple[()], sample_rate: int
+    path: str | os.PathLike[str],
+    motion: Motion,
+    audio: Float[np.ndarray, " N"] | tuple[()],
+    sample_rate: int,
+    skin: Skin | None = None,
 ) -> None:
     """Write a motion with its speech as MP4 (H.264, AAC), a picture for each frame of the motion, 720 x 720 pixels.
 
     Args:
         audio: mono samples in -1 to 1; empty for a silent film.
         sample_rate: of the audio, Hz.
+        skin: mesh of a character on the motion's skeleton, in place of our figure.
 
     Raises:
         InputError: a program is missing or fails, or the film would be too long.
@@ -100,7 +106,7 @@ def write_video(
     sound = np.asarray(audio, np.float32)
     with atomic_path(path) as temporary, tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.html"
-        write_page(page, [Figure(motion, "")], sound[:0], sample_rate, title="")
+        write_page(page, [Figure(motion, "", skin=skin)], sound[:0], sample_rate, title="")
         speech = None
         if sound.size:
             speech = Path(folder) / "speech.wav"
