@@ -59,7 +59,8 @@ def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray |
         InputError: there is no such accessor, it is of another type, or lies outside the file.
     """
     accessor = item(glb, "accessors", index, place)
-    kind = _KINDS.get(accessor.get("componentType", 0))
+    component = accessor.get("componentType")
+    kind = _KINDS.get(component) if isinstance(component, int) else None
     if accessor.get("type") != shape or kind is None:
         fail(glb.path, place, f"expected {shape}; the file is damaged: export it again.")
     count = _whole(glb, accessor.get("count"), place)

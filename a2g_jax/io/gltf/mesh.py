@@ -19,7 +19,7 @@ from a2g_jax.io.gltf.nodes import Node, ancestors, placed, read_nodes
 from a2g_jax.io.gltf.rig import NodeRig
 
 #: Most vertices that are read of a character.
-MOST_VERTICES = 2_000_000
+MOST_VERTICES = 500_000
 #: Linear colour of parts whose own is in a texture.
 _CLAY = (0.36, 0.33, 0.30)
 _TRIANGLES = 4
@@ -61,13 +61,13 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
         for part in _primitives(glb, row["mesh"]):
             if part is None:
                 return []
-            points, normals, own, weights, triangles, colour = part
+            points, normals, own, weights, triangles, (colour, two_sided) = part
             total += len(points)
             if total > MOST_VERTICES:
                 fail(glb.path, "meshes", f"have more than {MOST_VERTICES} vertices; export fewer objects.")
             if skin is None or own is None or weights is None:
                 own, weights = np.zeros((len(points), 4), int), np.tile([1.0, 0, 0, 0], (len(points), 1))
-            if own.max(initial=0) >= len(joints):
+            if own.max(initial=0) >= len(joints) or own.min(initial=0) < 0:
                 fail(glb.path, "meshes", "a vertex belongs to a joint that its skin has not; export it again.")
             moved, facing = np.zeros_like(points), np.zeros_like(points)
             for at in range(own.shape[1]):
@@ -75,7 +75,7 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
                 moved += share * ((moves[..., :3] @ points[..., None])[..., 0] + moves[..., 3])
                 facing += share * (moves[..., :3] @ normals[..., None])[..., 0]
             facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-12)
-            surfaces.append(Surface(colour, moved, facing, joints[own], weights, triangles))
+            surfaces.append(Surface(colour, moved, facing, joints[own], weights, triangles, two_sided))
     return surfaces
 
 
@@ -92,7 +92,7 @@ def _bones(
         inverse = read_matrices(glb, row["inverseBindMatrices"], len(listed), place)
     if inverse is None:
         return None
-    where = placed(glb, nodes, list(listed))
+    where = placed(glb, nodes, [*listed, *found.nodes])
     joints, matrices = np.zeros(len(listed), int), np.zeros((len(listed), 4, 4))
     for at, node in enumerate(listed):
         above = next((one for one in (node, *ancestors(nodes, node)) if one in order), None)
@@ -105,7 +105,7 @@ def _bones(
 def _rigid(
     glb: Glb, nodes: list[Node], node: int, found: NodeRig, joint: int
 ) -> tuple[Int[np.ndarray, " 1"], Float[np.ndarray, "1 4 4"]]:
-    where = placed(glb, nodes, [node])
+    where = placed(glb, nodes, [node, *found.nodes])
     return np.array([joint]), _offset(found, where, joint, node)[None]
 
 
@@ -124,47 +124,43 @@ def _offset(found: NodeRig, where: Any, joint: int, node: int) -> Float[np.ndarr
 
 
 def _primitives(glb: Glb, mesh: object) -> Iterator[tuple[Any, ...] | None]:
-    """Places, normals, joints, weights, triangles, colour of primitives of triangles; None for a compressed one."""
+    """Places, normals, joints, weights, triangles and look of primitives of triangles; None for a compressed one."""
     row = item(glb, "meshes", mesh, "nodes, mesh")
-    for number, part in enumerate(row.get("primitives", [])):
+    parts = row.get("primitives", [])
+    for number, part in enumerate(parts if isinstance(parts, list) else []):
         place = f"meshes[{mesh}], primitives[{number}]"
         attributes = part.get("attributes") if isinstance(part, dict) else None
-        if (
-            not isinstance(attributes, dict)
-            or part.get("mode", _TRIANGLES) != _TRIANGLES
-            or "POSITION" not in attributes
-        ):
+        if not isinstance(attributes, dict) or "POSITION" not in attributes:
             continue
+        if part.get("mode", _TRIANGLES) != _TRIANGLES:
+            continue
+        extensions = part.get("extensions")
+        if isinstance(extensions, dict) and "KHR_draco_mesh_compression" in extensions:
+            yield None
+            return
         values: dict[str, Any] = {}
         for name, shape in (("POSITION", "VEC3"), ("NORMAL", "VEC3"), ("JOINTS_0", "VEC4"), ("WEIGHTS_0", "VEC4")):
             if name in attributes:
                 values[name] = read_values(glb, attributes[name], shape, f"{place}, {name}")
-                if values[name] is None or part.get("extensions", {}).get("KHR_draco_mesh_compression"):
-                    yield None
-                    return
-        points = values["POSITION"]
-        count = len(points)
-        if any(len(value) != count for value in values.values()) or not np.isfinite(points).all():
-            fail(glb.path, place, "its vertices are damaged; export it again.")
-        indices = (
-            read_values(glb, part["indices"], "SCALAR", f"{place}, indices") if "indices" in part else np.arange(count)
-        )
-        if indices is None:
+        indices: Any = np.arange(len(values["POSITION"])) if values["POSITION"] is not None else None
+        if "indices" in part:
+            indices = read_values(glb, part["indices"], "SCALAR", f"{place}, indices")
+        if indices is None or any(value is None for value in values.values()):
             yield None
             return
-        triangles = indices.astype(np.int64).reshape(-1)[: len(indices) // 3 * 3].reshape(-1, 3)
-        if triangles.max(initial=0) >= max(count, 1):
+        points, joints, weights = (values.get(name) for name in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
+        count = len(values["POSITION"])
+        if any(len(value) != count or not np.isfinite(value).all() for value in values.values()):
+            fail(glb.path, place, "its vertices are damaged; export it again.")
+        if len(indices) and not (indices.min() >= 0 and indices.max() < count):
             fail(glb.path, place, "a triangle has a vertex that does not exist; export it again.")
-        normals = values.get("NORMAL")
-        if normals is None or not np.isfinite(normals).all():
-            normals = vertex_normals(points, triangles)
-        weights = values.get("WEIGHTS_0")
+        triangles = indices[: len(indices) // 3 * 3].astype(np.int64).reshape(-1, 3)
+        normals = values["NORMAL"] if "NORMAL" in values else vertex_normals(values["POSITION"], triangles)
         if weights is not None:
-            weights = np.clip(np.nan_to_num(weights), 0, None)
+            weights = np.clip(weights, 0, None)
             weights = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-9)
             weights[weights.sum(axis=1) < 0.5] = (1.0, 0.0, 0.0, 0.0)
-        joints = values.get("JOINTS_0")
-        yield points, normals, None if joints is None else joints.astype(int), weights, triangles, _colour(glb, part)
+        yield points, normals, None if joints is None else joints.astype(int), weights, triangles, _look(glb, part)
 
 
 def vertex_normals(points: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "F 3"]) -> Float[np.ndarray, "V 3"]:
@@ -177,14 +173,16 @@ def vertex_normals(points: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, 
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
-def _colour(glb: Glb, part: dict[str, Any]) -> tuple[float, float, float]:
-    """The base colour of a primitive's material, linear."""
+def _look(glb: Glb, part: dict[str, Any]) -> tuple[tuple[float, float, float], bool]:
+    """The base colour of a primitive's material, linear, and whether it is seen from behind."""
     if "material" not in part:
-        return _CLAY
+        return _CLAY, False
     material = item(glb, "materials", part["material"], "meshes, material")
-    base = material.get("pbrMetallicRoughness", {})
-    given = base.get("baseColorFactor", (1.0, 1.0, 1.0)) if isinstance(base, dict) else (1.0, 1.0, 1.0)
-    factor = [float(one) if isinstance(one, int | float) and 0 <= one <= 1 else 1.0 for one in list(given)[:3]]
-    if not isinstance(base, dict) or "baseColorTexture" in base or len(factor) < 3:
-        return (_CLAY[0] * factor[0], _CLAY[1] * factor[1], _CLAY[2] * factor[2]) if len(factor) == 3 else _CLAY
-    return (factor[0], factor[1], factor[2])
+    base = material.get("pbrMetallicRoughness")
+    base = base if isinstance(base, dict) else {}
+    given = base.get("baseColorFactor")
+    factor = given[:3] if isinstance(given, list) and len(given) >= 3 else [1.0, 1.0, 1.0]
+    red, green, blue = (float(one) if isinstance(one, int | float) and 0 <= one <= 1 else 1.0 for one in factor)
+    if "baseColorTexture" in base:
+        red, green, blue = red * _CLAY[0], green * _CLAY[1], blue * _CLAY[2]
+    return (red, green, blue), material.get("doubleSided") is True

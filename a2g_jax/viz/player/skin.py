@@ -36,6 +36,8 @@ class Skin:
     joints: Int[np.ndarray, "V 4"]
     weights: Float[np.ndarray, "V 4"]
     triangles: Int[np.ndarray, "F 3"]
+    two_sided: bool = False
+    """Whether some triangles are to be seen from behind."""
 
     def posed(self, rotations: Float[np.ndarray, "J 3 3"], root: Float[np.ndarray, "3"]) -> "Skin":
         """The vertices in a pose, bound as before: linear blend skinning.
@@ -70,19 +72,13 @@ def make_skin(skeleton: Skeleton, surfaces: Sequence[Surface], most: int = MOST_
     join = lambda name: np.concatenate([getattr(surface, name) for surface in surfaces])  # noqa: E731
     colours = np.concatenate([np.tile(surface.colour, (len(surface.places), 1)) for surface in surfaces])
     triangles = np.concatenate([one.triangles + start for one, start in zip(surfaces, starts, strict=False)])
-    skin = Skin(skeleton, join("places"), join("normals"), colours, join("joints"), join("weights"), triangles)
+    two_sided = any(surface.two_sided for surface in surfaces)
+    skin = Skin(
+        skeleton, join("places"), join("normals"), colours, join("joints"), join("weights"), triangles, two_sided
+    )
     used, triangles = np.unique(triangles, return_inverse=True)
     skin = _at(skin, used, triangles.reshape(-1, 3))
-    if len(skin.places) <= most:
-        return skin
-    low, high = 1e-4, 0.5
-    for _ in range(16):
-        middle = float(np.sqrt(low * high))
-        if len(np.unique(_cells(skin, middle), axis=0)) > most:
-            low = middle
-        else:
-            high = middle
-    return _merged(skin, _cells(skin, high))
+    return skin if len(skin.places) <= most else _merged(skin, _cells(skin, most))
 
 
 def _at(skin: Skin, rows: Int[np.ndarray, " K"], triangles: Int[np.ndarray, "F 3"]) -> Skin:
@@ -90,30 +86,39 @@ def _at(skin: Skin, rows: Int[np.ndarray, " K"], triangles: Int[np.ndarray, "F 3
     return replace(skin, triangles=triangles, **{name: getattr(skin, name)[rows] for name in names})
 
 
-def _cells(skin: Skin, size: float) -> Int[np.ndarray, "V 7"]:
+def _cells(skin: Skin, most: int) -> Int[np.ndarray, "V 7"]:
+    """Cells of vertices that are merged; there are at most so many."""
     owner = np.take_along_axis(skin.joints, skin.weights.argmax(axis=1)[:, None], axis=1)
     facing = np.abs(skin.normals).argmax(axis=1)[:, None]
     sign = np.take_along_axis(skin.normals, facing, axis=1) > 0
     colour = np.round(skin.colours * 255).astype(int) @ np.array([1, 256, 65536])
-    return np.hstack([np.floor(skin.places / size).astype(int), owner, facing, sign, colour[:, None]])
+    same = np.hstack([owner, facing, sign, colour[:, None]])
+    low, high, found = 1e-4, 0.5, same
+    for _ in range(16):
+        middle = float(np.sqrt(low * high))
+        cells = np.hstack([np.floor(skin.places / middle).astype(int), same])
+        if len(np.unique(cells, axis=0)) > most:
+            low = middle
+        else:
+            high, found = middle, cells
+    return found if found is not same else np.hstack([np.zeros((len(same), 3), int), same])
 
 
 def _merged(skin: Skin, cells: Int[np.ndarray, "V 7"]) -> Skin:
     _, first, group, count = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
     group = group.reshape(-1)
-    triangles = group[skin.triangles]
-    whole = (
-        (triangles[:, 0] != triangles[:, 1])
-        & (triangles[:, 1] != triangles[:, 2])
-        & (triangles[:, 2] != triangles[:, 0])
-    )
-    triangles = np.unique(np.sort(triangles[whole], axis=1), axis=0, return_index=True)[1]
-    triangles = group[skin.triangles][whole][np.sort(triangles)]
+    merged = _at(skin, first, _whole(group[skin.triangles]))
     mean = lambda values: np.stack(  # noqa: E731
         [np.bincount(group, values[:, axis], len(count)) / count for axis in range(3)], axis=1
     )
-    merged = _at(skin, first, triangles)
     return replace(merged, places=mean(skin.places), normals=_unit(mean(skin.normals)))
+
+
+def _whole(triangles: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, "G 3"]:
+    """Triangles of three different vertices, each once."""
+    triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]
+    return triangles[np.sort(once)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +170,7 @@ class Bound:
         return {
             "vertices": len(skin.places),
             "triangles": len(skin.triangles),
+            "open": skin.two_sided,
             "low": low.tolist(),
             "step": step.tolist(),
             "centres": [round(float(value), 6) for value in self.centres.reshape(-1)],

@@ -330,6 +330,15 @@ window.a2gPlayer = {
   view: (change) => player.view(change),
   playing: () => player.playing,
   vertices: (index = 0) => Array.from(player.figures[index].mesh.places),
+  // Draws moving pictures from a second on, 25 of a second, each complete before the next.
+  moving: (from, count) => {
+    const { gl } = player.renderer, pixel = new Uint8Array(4);
+    for (let i = 0; i < count; i++) {
+      player.now = from + 0.04 * i;
+      player.draw(performance.now(), false);
+      if (gl) gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    }
+  },
   pictures: () => player.pictures,
   scale: () => player.renderer.scale,
   speech: () => player.speech,

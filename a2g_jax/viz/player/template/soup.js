@@ -49,7 +49,7 @@ class Soup {
     const total = parts.reduce((sum, { figure, thick, thin }) => sum + thick * THICK.count + thin * THIN.count + (figure.mesh ? figure.mesh.count : 0), 0);
     if (this.data.length < total * VERTEX) this.data = new Float32Array(Math.ceil(1.2 * total) * VERTEX);
     const shape = parts.map(({ figure, thick, thin }) => `${thick} ${thin} ${figure.mesh ? figure.mesh.id : ""}`).join();
-    this.ranges = shape === this.shape ? this.ranges : this.connect(parts, total);
+    this.ranges = shape === this.shape ? this.ranges : this.connect(parts);
     this.shape = shape;
     let at = 0;
     for (const { figure, thick, thin, from } of parts) {
@@ -66,7 +66,7 @@ class Soup {
   }
 
   // Triangles, which stay the same while the parts do. Ranges of each figure: its large parts, then the others.
-  connect(parts, total) {
+  connect(parts) {
     const lists = [], ranges = [];
     let base = 0, at = 0;
     const add = (indices, count) => { lists.push([indices, base]); base += count; at += indices.length; };

@@ -42,7 +42,7 @@ async function unpackMesh(mesh, id) {
     for (let k = 0; k < 3; k++) colours[4 * i + k] = Math.pow(shades[3 * i + k] / 255, 2.2);
     colours[4 * i + 3] = 0.12;
   }
-  return { id, count: vertices, bind: places, facing: normals, bones, weights, colours, indices: Uint32Array.from(corners), centres: mesh.centres };
+  return { id, count: vertices, bind: places, facing: normals, bones, weights, colours, indices: corners, open: mesh.open, centres: mesh.centres };
 }
 
 // 16-bit samples of the speech, and a WAV file of them, which any browser seeks in exactly; null without speech.

@@ -174,8 +174,8 @@ class WebGLRenderer {
     }
     this.soup.fill(band.figures, this.coarse);
     const casters = band.figures.map((figure) => ({ ...figure, count: figure.shapes }));
-    // Cones are closed, and their far sides need no drawing.
-    if (this.coarse && !band.figures.some((figure) => figure.mesh)) gl.enable(gl.CULL_FACE); else gl.disable(gl.CULL_FACE);
+    // Cones and most meshes are closed, and their far sides need no drawing.
+    if (this.coarse && !band.figures.some((figure) => figure.mesh?.open)) gl.enable(gl.CULL_FACE); else gl.disable(gl.CULL_FACE);
 
     const { light, area } = this.shadows.cast(band, casters, scene.bands.length === 1);
     const view = [band.x * sx, (scene.height - band.y - band.height) * sy, band.width * sx, band.height * sy].map(Math.round);
