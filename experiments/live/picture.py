@@ -21,7 +21,7 @@ from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
 from experiments.studio_pictures import DESK, PHONE, beside, save, shot
 
 #: Seconds of speech, and frames after which the picture is taken.
-SECONDS, FRAMES = 30.0, 90
+SECONDS, FRAMES = 30.0, 45
 _MICROPHONE = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream")
 
 

@@ -6,6 +6,7 @@ does its work with the files that the ones before it left.
 
 import re
 import shutil
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 import pytest
@@ -104,7 +105,7 @@ def reason(text):
 
 def shortened(words):
     """The call with a small training or corpus."""
-    if words[0] == "train" and "--settings" not in words and "--resume" not in words:
+    if words[0] == "train" and "--settings" not in words and ("--resume" not in words or "--seeds" in words):
         words = re.sub(r" --(steps|batch-size) \d+", "", " ".join(words)).split()
         return [*words, *SMALL, *([] if "--from" in words else SMALL_STAGES.get(words[1], []))]
     if words[0] == "train" and "--resume" in words and "--steps" in words:
@@ -144,6 +145,9 @@ def before(text, here):
     out = re.search(r"--out (\S+)", text)
     if out and re.match(r"a2g (prepare|train)\b", text) and "--resume" not in text:
         shutil.rmtree(here / out[1], ignore_errors=True)
+    if "--config settings.toml" in text:
+        with (here / "settings.toml").open("w") as file, redirect_stdout(file):
+            assert main(["train", "audio2gestures", "--settings", "--toml"]) == 0
     if "--corpus corpus" in text and not (here / "corpus").exists():
         assert main(["prepare", "talker", "--minutes", "4", "--out", "corpus"]) == 0
     needs_run = re.search(r"(generate|evaluate) run\b", text) or "--resume" in text
