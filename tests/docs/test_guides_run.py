@@ -32,6 +32,7 @@ NOT_HERE = {
     "--merge": "tests/data/test_shards.py prepares parts and merges them",
     "/data/": "needs several hosts",
     "tensorboard ": "starts a server",
+    "--tensorboard": "needs an extra that tests do not install",
     "run_seed": "needs runs of several seeds; tests/evaluation/test_seeds.py has them",
     "jax.devices()": "prints the devices of the machine",
     "pytest": "is this",
