@@ -18,7 +18,8 @@ Item = TypeVar("Item")
 def progress_bar(total: int, what: str, unit: str) -> Iterator[tqdm]:
     """A bar with a rate and the remaining time; its line ends also on errors, so that messages start on a new one."""
     every = 0.5 if sys.stderr.isatty() else 10.0
-    with tqdm(total=total, desc=what, unit=unit, file=sys.stderr, mininterval=every) as bar:
+    # A bar inside another one vanishes at its end.
+    with tqdm(total=total, desc=what, unit=unit, file=sys.stderr, mininterval=every, leave=None) as bar:
         yield bar
 
 
@@ -59,3 +60,24 @@ def checkpoint(done: int = 0, total: int = 0, unit: str = "") -> None:
     watcher = _watcher.get()
     if watcher is not None:
         watcher(done, total, unit)
+
+
+@contextmanager
+def counted_steps(total: int, what: str, unit: str) -> Iterator[Callable[[], None]]:
+    """A function to call after each step of long work: it advances a bar or, where checkpoints are watched, is one."""
+    done = 0
+
+    def watched_step() -> None:
+        nonlocal done
+        done += 1
+        checkpoint(done, total, unit)
+
+    if _watcher.get() is not None:
+        yield watched_step
+        return
+    with progress_bar(total, what, unit) as bar:
+
+        def shown_step() -> None:
+            bar.update()
+
+        yield shown_step

@@ -132,10 +132,10 @@ def write_samples(
     """
     from a2g_jax.generation.checked import Checked
     from a2g_jax.generation.export import export
+    from a2g_jax.generation.ranking import read_scores
     from a2g_jax.progress import progress_bar
 
     checked = Checked(run, sampler, strict=options.strict)
-    scores: list[Any] = []
     with progress_bar(options.samples, "generating", "motion") as bar:
         written = export(
             run,
@@ -148,13 +148,12 @@ def write_samples(
             title=title,
             report=lambda done: bar.update(done - bar.n),
             order=options.order,
-            scores=scores,
             **about,
         )
     print_written(options.out, written)
     for line in checked.lines():
         print(line)
-    if scores:
+    if scores := read_scores(options.out):
         print("best first:", ", ".join(f"sample {one.sample} ({one.score:.2f})" for one in scores))
 
 

@@ -152,7 +152,9 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
     """
     from a2g_jax.generation.checked import Checked
     from a2g_jax.generation.export import describe_findings, export, requested
+    from a2g_jax.generation.ranking import read_scores
     from a2g_jax.io.audio import write_audio
+    from a2g_jax.io.npz import read_motion_npz
     from a2g_jax.serving.studio.takes import SPEECH, Outcome
 
     options, extra = _parser().parse_known_args(list(arguments))
@@ -180,6 +182,8 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         order="best",
     )
     write_audio(folder / SPEECH, ready.audio, rate)
+    skeleton = read_motion_npz(folder / "sample_00.npz").skeleton
+    skin = ready.delivery.skin(skeleton)  # before the lines, which say what cannot be read of it
     described = [describe_findings(report.findings, ready.run.config.fps) for report in checked.reports]
     return Outcome(
         seconds=len(ready.audio) / rate,
@@ -187,19 +191,12 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         lanes=tuple(lanes),
         notes=tuple(note for note, _ in described),
         tracks=tuple(tracks for _, tracks in described),
-        scores=_scores(folder),
+        scores=tuple(one.score for one in sorted(read_scores(folder))),
         lines=tuple(filter(None, (*ready.lines, *checked.lines(), *ready.report(folder)))),
         plain=checked.plain(),
         warning=ready.warning,
+        skin=skin,
     )
-
-
-def _scores(folder: Path) -> tuple[float, ...]:
-    """The scores of the samples by number; empty where they have none."""
-    from a2g_jax.io.files import read_json
-
-    rows = read_json(folder / "checks.json").get("scores", ())
-    return tuple(float(row["score"]) for row in sorted(rows, key=lambda row: row["sample"]))
 
 
 def _opened(name: str) -> "Run":

@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion, resample
 from a2g_jax.geometry.retarget import Match, find_rig, match_rigs, retarget, with_relaxed_hands
 from a2g_jax.geometry.retarget.upright import facing, upright_motion
@@ -13,6 +14,7 @@ from a2g_jax.geometry.skeleton import Skeleton
 
 if TYPE_CHECKING:
     from a2g_jax.io.character import Character
+    from a2g_jax.viz.player.skin import Skin
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,24 @@ class Delivery:
         own = retarget(motion, self._matched(motion.skeleton))
         return Made(upright_motion(own, self.character.rig, self.character.metres), own)
 
+    def skin(self, skeleton: Skeleton) -> "Skin | None":
+        """The character's mesh for pages, on the skeleton of motions that are shown; None without a character or a mesh
+        that can be read, which :meth:`lines` then says."""
+        if self.character is None:
+            return None
+        if "skin" not in self._kept:
+            from a2g_jax.viz.player.skin import make_skin
+
+            try:
+                self._kept["skin"] = make_skin(skeleton, self.character.surfaces())
+                reason = f"{self.character.path}: its mesh is compressed"
+            except InputError as error:
+                self._kept["skin"], reason = None, str(error).rstrip(".")
+            if self._kept["skin"] is None and self.character.suffix != ".bvh":
+                self._kept["unread"] = [f"{reason}; the page shows our figure in its place"]
+        found: Skin | None = self._kept["skin"]
+        return found
+
     def _matched(self, skeleton: Skeleton) -> Match:
         # All motions of a run have the same skeleton; its rig is found once.
         if "match" not in self._kept or not self._kept["match"].source.skeleton.same_tree(skeleton):
@@ -78,9 +98,10 @@ class Delivery:
                 missed[joint] = max(degrees, missed.get(joint, 0.0))
 
     def lines(self) -> list[str]:
-        """What was approximated in the files, a line each."""
+        """What was approximated in the files and on the page, a line each."""
         missed: dict[str, float] = self._kept.get("missed", {})
-        return [
+        unread: list[str] = self._kept.get("unread", [])
+        return unread + [
             f"{joint} has too few rotation channels in the character's file: off by up to {degrees:.1f} degrees"
             for joint, degrees in missed.items()
         ]

@@ -38,7 +38,6 @@ def export(
     sample_rate: int | None = None,
     delivery: Delivery = PLAIN,
     order: str = "number",
-    scores: "list[Score] | None" = None,
 ) -> dict[str, int]:
     """Generate, check and write ``sample_00.bvh``, ``sample_00.npz``, ..., ``index.html`` and ``checks.json``.
 
@@ -64,8 +63,8 @@ def export(
         sample_rate: of the audio, Hz, which is resampled to the run's; None for the run's own.
         delivery: the character and the frame rate to write for. Motions are checked before, on the run's skeleton.
         order: of the figures on the page, by number, or ``"best"`` first (:mod:`a2g_jax.generation.ranking`); then
-            ``checks.json`` has order and scores. Files keep their names.
-        scores: a list that the scores are put into, best first.
+            ``checks.json`` has order and scores, which :func:`~a2g_jax.generation.ranking.read_scores` reads. Files
+            keep their names.
 
     Returns:
         How many files of each format were written.
@@ -98,24 +97,22 @@ def export(
     with MotionFiles(out, ("sample",), formats, REPORTS, speech=speech, writers=delivery.writers()) as files:
         done = 0
         try:
-            for done, motion in enumerate(motions, start=1):
+            for number, motion in enumerate(motions):
                 made = delivery.make(motion)
-                files.write(done - 1, made.shown, own=made.by_format(delivery.own_format))
+                skin = delivery.skin(made.shown.skeleton) if PAGE in formats or files.drawn else None
+                files.write(number, made.shown, own=made.by_format(delivery.own_format), skin=skin)
+                done, findings = number + 1, checked.reports[number].findings
                 if scorer is not None:
-                    ranked.append(scorer.score(done - 1, motion, checked.reports[done - 1].findings))
+                    ranked.append(scorer.score(number, motion, findings))
                 if PAGE in formats:
-                    findings = checked.reports[done - 1].findings
-                    names = files.names(done - 1)
-                    figure = checked_figure(made.shown, f"sample {done - 1}", findings, files=names)
-                    figures.append(replace(figure, number=done - 1))
+                    figure = checked_figure(made.shown, f"sample {number}", findings, files=files.names(number))
+                    figures.append(replace(figure, number=number, skin=skin))
                 if not checked.strict:
                     report(done)
         finally:
-            if done:  # motions before one that is refused stay, with the findings on all
+            if done or any(files.folder.iterdir()):  # files before an error stay, with the findings on all motions
                 ranked = [] if scorer is None else best_first(ranked)
                 write_json(files.folder / "checks.json", checked.to_json() | _order_to_json(ranked))
-        if scores is not None:
-            scores[:] = ranked
         if figures:
             figures = [_scored(figures[one.sample], one) for one in ranked] or figures
             write_page(

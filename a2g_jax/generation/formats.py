@@ -17,6 +17,7 @@ from a2g_jax.plugins import entry_points_of, load_entry_point, load_object
 
 if TYPE_CHECKING:
     from a2g_jax.geometry.motion import Motion
+    from a2g_jax.viz.player.skin import Skin
 
 
 @dataclass(frozen=True)
@@ -29,20 +30,21 @@ class MotionFormat:
     """``module:function`` of ``write(path, motion)``, which writes a whole file or none."""
     sound: bool = False
     """Whether the writer takes the speech as well: ``write(path, motion, audio, sample_rate)``."""
+    drawn: bool = False
+    """Whether the writer draws the motion, and takes the mesh of a character as ``skin=``."""
     check: str = ""
     """``module:function`` that raises an ``InputError`` where files cannot be written for lack of a program."""
 
-    def write(self, path: Path, motion: "Motion", speech: "Speech | None" = None) -> None:
+    def write(self, path: Path, motion: "Motion", speech: "Speech | None" = None, skin: "Skin | None" = None) -> None:
         """Write a motion to a file.
 
         Args:
             speech: samples and their rate, for a writer that takes them.
+            skin: mesh of the character, for a writer that draws.
         """
         writer = load_object(self.writer, "writer")
-        if self.sound:
-            writer(path, motion, *(speech or ((), 16_000)))
-        else:
-            writer(path, motion)
+        sound = (speech or ((), 16_000)) if self.sound else ()
+        writer(path, motion, *sound, **({"skin": skin} if self.drawn else {}))
 
 
 #: Mono samples in -1 to 1, and their rate in Hz.
@@ -58,7 +60,13 @@ MOTION_FORMATS: dict[str, MotionFormat] = {
 MORE_FORMATS: dict[str, MotionFormat] = {
     "glb": MotionFormat(".glb", "a2g_jax.viz.mannequin_glb:write_mannequin_glb"),
     "smplx": MotionFormat(".smplx.npz", "a2g_jax.generation.smplx:write_smplx_npz"),
-    "mp4": MotionFormat(".mp4", "a2g_jax.viz.player.video:write_video", True, "a2g_jax.viz.player.video:check_video"),
+    "mp4": MotionFormat(
+        ".mp4",
+        "a2g_jax.viz.player.video:write_video",
+        sound=True,
+        drawn=True,
+        check="a2g_jax.viz.player.video:check_video",
+    ),
 }
 #: The name of the page of all motions, which :func:`a2g_jax.viz.player.write_page` writes.
 PAGE = "html"
@@ -185,17 +193,28 @@ class MotionFiles:
     def __exit__(self, *error: Any) -> bool | None:
         return self._staged.__exit__(*error)
 
+    @property
+    def drawn(self) -> bool:
+        """Whether a format is drawn."""
+        return any(each.drawn for each in self._formats.values())
+
     def names(self, number: int, stem: str = "") -> tuple[str, ...]:
         """Names of the files of a motion."""
         return tuple(f"{stem or self._stem}_{number:02d}{each.suffix}" for each in self._formats.values())
 
     def write(
-        self, number: int, motion: "Motion", stem: str = "", own: Mapping[str, "Motion"] | None = None
+        self,
+        number: int,
+        motion: "Motion",
+        stem: str = "",
+        own: Mapping[str, "Motion"] | None = None,
+        skin: "Skin | None" = None,
     ) -> dict[str, Any]:
         """Write the files of a motion.
 
         Args:
             own: motions of other skeletons for some formats, by name.
+            skin: mesh of the character that the motion is of, for formats that are drawn.
 
         Returns:
             What the given writers returned, by format.
@@ -207,5 +226,5 @@ class MotionFiles:
             if name in self._writers:
                 returned[name] = self._writers[name](path, moved)
             else:
-                each.write(path, moved, self._speech)
+                each.write(path, moved, self._speech, skin)
         return returned

@@ -14,7 +14,9 @@ Weights were chosen on 36 speeches of 16 s with 8 samples of ``demo`` and of ``d
 those on which ``python -m experiments.ranking`` measures what the order is worth.
 """
 
+import os
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +25,7 @@ from scipy import ndimage
 
 from a2g_jax.generation.generator import speech_at_rate
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.io.files import read_json
 from a2g_jax.metrics.body.check import BodyFinding, check_motion, frames_outside
 from a2g_jax.metrics.rhythm import agreement, energy_peaks, speech_envelope, speed_peaks, wrist_speed
 from a2g_jax.training.run import Run
@@ -45,6 +48,15 @@ class Score(NamedTuple):
     def to_json(self) -> dict[str, Any]:
         """The score as JSON values."""
         return {name: value if name == "sample" else round(value, 4) for name, value in self._asdict().items()}
+
+
+def read_scores(folder: str | os.PathLike[str]) -> list[Score]:
+    """The scores in the ``checks.json`` of a folder of samples, best first; none where samples were not ranked.
+
+    Raises:
+        InputError: there is no such file, or it is damaged.
+    """
+    return [Score(**row) for row in read_json(Path(folder) / "checks.json").get("scores", ())]
 
 
 class Scorer:

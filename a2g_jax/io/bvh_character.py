@@ -10,6 +10,7 @@ from a2g_jax.geometry.retarget import find_rig
 from a2g_jax.io.bvh_hierarchy import Layout
 from a2g_jax.io.bvh_reader import doubts, read_with_layout
 from a2g_jax.io.bvh_writer import write_like
+from a2g_jax.io.gltf.figure import Surface
 
 Offset = tuple[float, float, float]
 _OFFSET = re.compile(r"(OFFSET)((?:[ \t]+[^\s{}]+){3})", re.IGNORECASE)
@@ -39,6 +40,10 @@ class BvhCharacter:
     def notes(self) -> list[str]:
         """What is to be noticed about the file, a sentence each."""
         return self._notes
+
+    def surfaces(self) -> list[Surface]:
+        """None: there are no meshes in a BVH file."""
+        return []
 
     def write(self, path: Path, motion: Motion) -> dict[str, float]:
         """Write a motion of the rig's skeleton; see :func:`~a2g_jax.io.bvh.write_like`."""

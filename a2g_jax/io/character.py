@@ -9,6 +9,7 @@ from a2g_jax.errors import InputError
 if TYPE_CHECKING:
     from a2g_jax.geometry.motion import Motion
     from a2g_jax.geometry.retarget import Rig
+    from a2g_jax.io.gltf.figure import Surface
 
 #: Suffixes of the files that are read, with what is written for each.
 SUFFIXES = {".bvh": ".bvh", ".glb": ".glb", ".vrm": ".glb"}
@@ -29,6 +30,11 @@ class Character(Protocol):
 
     def notes(self) -> list[str]:
         """What is to be noticed about the file, a sentence each."""
+        ...
+
+    def surfaces(self) -> "list[Surface]":
+        """The meshes in the rig's reference pose, in the plain axes of
+        :func:`~a2g_jax.geometry.retarget.upright.upright_motion` and metres; empty without any that can be read."""
         ...
 
     def write(self, path: Path, motion: "Motion") -> dict[str, float]:

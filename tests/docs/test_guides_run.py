@@ -6,6 +6,7 @@ does its work with the files that the ones before it left.
 
 import re
 import shutil
+from contextlib import redirect_stdout
 from dataclasses import replace
 
 import pytest
@@ -31,6 +32,7 @@ NOT_HERE = {
     "--merge": "tests/data/test_shards.py prepares parts and merges them",
     "/data/": "needs several hosts",
     "tensorboard ": "starts a server",
+    "--tensorboard": "needs an extra that tests do not install",
     "run_seed": "needs runs of several seeds; tests/evaluation/test_seeds.py has them",
     "jax.devices()": "prints the devices of the machine",
     "pytest": "is this",
@@ -59,6 +61,11 @@ NOT_HERE = {
 MODULES = ("def build(", "ENTRY", "DATASET", "MotionFormat", "Metric(", "def write_csv", "LinearConfig")
 #: The smallest trainings and corpora.
 SMALL = ["--steps", "4", "--batch-size", "2", "--log-every", "2", "--validate-every", "4", "--checkpoint-every", "4"]
+#: Further stages of a model, whose steps are settings of their own.
+SMALL_STAGES = {
+    "audio2gestures": ["--adversarial-steps", "2"],
+    "emotion_gesture": ["--mining-steps", "2", "--vae-steps", "2", "--sampled-steps", "2"],
+}
 
 
 @pytest.fixture(scope="module")
@@ -99,10 +106,11 @@ def reason(text):
 
 def shortened(words):
     """The call with a small training or corpus."""
-    if words[0] == "train" and "--settings" not in words and "--resume" not in words:
+    if words[0] == "train" and "--settings" not in words and ("--resume" not in words or "--seeds" in words):
         words = re.sub(r" --(steps|batch-size) \d+", "", " ".join(words)).split()
-        gan = ["--adversarial-steps", "2"] if words[1] == "audio2gestures" and "--from" not in words else []
-        return [*words, *SMALL, *gan]
+        return [*words, *SMALL, *([] if "--from" in words else SMALL_STAGES.get(words[1], []))]
+    if words[0] == "train" and "--resume" in words and "--steps" in words:
+        words[words.index("--steps") + 1] = "6"  # two more than the others
     if "--minutes" in words:
         words[words.index("--minutes") + 1] = "1"
     if words[0] == "evaluate" and "--samples" not in words and "--compare" not in words:
@@ -138,6 +146,9 @@ def before(text, here):
     out = re.search(r"--out (\S+)", text)
     if out and re.match(r"a2g (prepare|train)\b", text) and "--resume" not in text:
         shutil.rmtree(here / out[1], ignore_errors=True)
+    if "--config settings.toml" in text:
+        with (here / "settings.toml").open("w") as file, redirect_stdout(file):
+            assert main(["train", "audio2gestures", "--settings", "--toml"]) == 0
     if "--corpus corpus" in text and not (here / "corpus").exists():
         assert main(["prepare", "talker", "--minutes", "4", "--out", "corpus"]) == 0
     needs_run = re.search(r"(generate|evaluate) run\b", text) or "--resume" in text

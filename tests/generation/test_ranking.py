@@ -9,7 +9,7 @@ import pytest
 from a2g_jax import rank_samples
 from a2g_jax.errors import InputError
 from a2g_jax.generation.export import export
-from a2g_jax.generation.ranking import Scorer
+from a2g_jax.generation.ranking import Scorer, read_scores
 from a2g_jax.talker.recordings import resample_motion, talk
 from a2g_jax.training.body_extremes import corpus_extremes
 from a2g_jax.training.run import Run
@@ -83,10 +83,11 @@ class Given:
 
 def test_export_keeps_names_and_writes_the_order(run, tmp_path):
     motions = [still(SPEECH.motion), shifted(SPEECH.motion, 2.3), SPEECH.motion]
-    scores = []
     about = {"samples": 3, "seed": 0, "title": "speech", "formats": ("npz", "html")}
-    export(run, Given(motions), SPEECH.audio, tmp_path / "best", order="best", scores=scores, **about)
+    export(run, Given(motions), SPEECH.audio, tmp_path / "best", order="best", **about)
     export(run, Given(motions), SPEECH.audio, tmp_path / "plain", **about)
+    scores = read_scores(tmp_path / "best")
+    assert read_scores(tmp_path / "plain") == []
     order = json.loads((tmp_path / "best/checks.json").read_text())["order"]
     assert order == [one.sample for one in scores] == [2, 1, 0]
     assert "order" not in json.loads((tmp_path / "plain/checks.json").read_text())

@@ -1,14 +1,17 @@
 """The studio over HTTP with a generator that needs no model: takes, files, ranking, limits, and no leftovers."""
 
+import asyncio
 import io
 import json
 import threading
 import time
 import zipfile
+from contextlib import suppress
 
 import httpx
 import numpy as np
 import pytest
+from starlette.requests import Request
 
 from a2g_jax.errors import InputError
 from a2g_jax.generation.capabilities import Capabilities, Setting
@@ -18,7 +21,7 @@ from a2g_jax.io.npz import write_motion_npz
 from a2g_jax.io.words import Word
 from a2g_jax.progress import checkpoint
 from a2g_jax.serving.run import served
-from a2g_jax.serving.studio.routes import studio_app
+from a2g_jax.serving.studio.routes import _Api, studio_app
 from a2g_jax.serving.studio.studio import Studio
 from a2g_jax.serving.studio.takes import SPEECH, Outcome
 from a2g_jax.talker.recordings import talk
@@ -174,6 +177,44 @@ def test_a_running_request_is_cancelled_and_leaves_no_files(client, studio, gene
     assert studio.find(generate(client, studio)).outcome.seconds == SECONDS
 
 
+def test_work_that_goes_on_after_its_take_is_dropped_leaves_no_files(client, studio, monkeypatch, recording):
+    reached, go = threading.Event(), threading.Event()
+
+    def deaf(arguments, folder, job):
+        reached.set()
+        assert go.wait(10)
+        folder.mkdir(exist_ok=True)  # as every writer of files does
+        write_audio(folder / SPEECH, recording.audio, 16000)
+        return Outcome(SECONDS)
+
+    monkeypatch.setattr(studio, "_generate", deaf)
+    take = studio.takes[client.post("/api/takes", json=wanted()).json()["id"]]
+    assert reached.wait(5)
+    assert client.delete(f"/api/takes/{take.id}").status_code == 204
+    assert list(studio.folder.glob("take-*")) == []
+    go.set()
+    assert studio.jobs.wait(take.job, 10.0)
+    assert list(studio.folder.glob("take-*")) == []
+
+
+def test_streams_of_events_are_limited_from_the_moment_of_their_request(studio, monkeypatch):
+    monkeypatch.setattr("a2g_jax.serving.studio.routes.MOST_STREAMS", 2)
+    api = _Api(studio)
+
+    async def gone(_message=None):
+        raise OSError("the client has gone")
+
+    async def opened():
+        streams = [await api.events(Request({"type": "http"})) for _ in range(2)]
+        with pytest.raises(InputError, match="2 pages of this studio are open"):
+            await api.events(Request({"type": "http"}))
+        with suppress(Exception):  # whichever error: nothing was sent
+            await streams[0]({"type": "http"}, gone, gone)
+        await api.events(Request({"type": "http"}))
+
+    asyncio.run(opened())
+
+
 def test_events_follow_the_state(client, studio, generator):
     generator.held.set()
     with client.stream("GET", "/api/events") as events:
@@ -298,7 +339,7 @@ def test_films_wait_in_the_queue_and_can_be_cancelled(client, studio, monkeypatc
     take = generate(client, studio)
     reached = threading.Event()
 
-    def film(path, motion, audio, rate):
+    def film(path, motion, audio, rate, skin=None):
         for frame in range(10_000):
             reached.set()
             checkpoint(frame + 1, 10_000, "frame")

@@ -15,9 +15,14 @@ def _read(path):
     return {"seconds": 2.0, "warnings": [f"{path}: is doubtful."]}
 
 
+def small(folder, **options):
+    kinds = {"speech": Kind("speech", (".wav", ".mp4"), 1000, _read)}
+    return Uploads(folder, kinds, files=2, most_bytes=500, **options)
+
+
 @pytest.fixture
 def uploads(tmp_path):
-    return Uploads(tmp_path, {"speech": Kind("speech", (".wav", ".mp4"), 1000, _read)}, files=2, most_bytes=500)
+    return small(tmp_path)
 
 
 def send(uploads, data=b"sound", name="talk.wav", kind="speech"):
@@ -48,6 +53,7 @@ def test_an_unknown_file_is_refused(uploads, id):
         ("talk.wav", b"bad", r"^talk\.wav: is bad at byte 3; export talk\.wav again\.$"),
         ("talk.wav", b"", "talk.wav: is empty"),
         ("talk.wav", b"x" * 1001, "is larger than 0 MB"),
+        ("talk.wav", b"x" * 501, "too many files arrive"),
         ("talk.exe", b"x", r"talk\.exe: is not a file for speech; choose WAV, MP4\."),
         ("", b"x", "file: is not a file for speech"),
         ("wav", b"x", "is not a file for speech"),
@@ -76,18 +82,36 @@ def test_unknown_kinds_are_refused(uploads):
         uploads.incoming("weights", "a.wav")
 
 
-def test_the_oldest_files_make_room_unless_they_are_used(uploads, tmp_path):
+def test_the_oldest_files_make_room_unless_they_are_used(tmp_path):
+    used = []
+    uploads = small(tmp_path, in_use=lambda: used)
     uploads.add(Upload("demo", "speech", "demo", tmp_path / "elsewhere.flac", keep=True))
-    kept = [send(uploads, name=f"{number}.wav") for number in range(4)]
-    uploads.drop_oldest([kept[0].path])
+    kept = [send(uploads, name="0.wav")]
+    used.append(kept[0].path)
+    kept += [send(uploads, name=f"{number}.wav") for number in range(1, 4)]
     assert [upload.name for upload in uploads.all()] == ["demo", "0.wav", "3.wav"]
-    assert [kept[k].path.exists() for k in range(4)] == [True, False, False, True]
+    assert [one.path.exists() for one in kept] == [True, False, False, True]
 
 
 def test_many_bytes_make_room_as_well(uploads):
     first, second = send(uploads, b"x" * 300), send(uploads, b"x" * 300)
-    uploads.drop_oldest()
     assert (first.path.exists(), second.path.exists()) == (False, True)
+
+
+def test_files_that_arrive_count_and_give_their_room_back(uploads, tmp_path):
+    with uploads.incoming("speech", "one.wav") as one:
+        one.write(b"x" * 300)
+        with uploads.incoming("speech", "two.wav") as two:
+            two.write(b"x" * 150)
+            with pytest.raises(InputError, match="too many files arrive"):
+                two.write(b"x" * 150)
+        third = send(uploads, b"x" * 150, name="three.wav")
+        one.write(b"x" * 90)
+        assert not third.path.exists()  # an older file makes room for what arrives
+        one.finish()
+    with uploads.incoming("speech", "four.wav") as four:
+        four.write(b"x" * 350)
+        assert list(tmp_path.iterdir()) == [four.path]
 
 
 def test_long_names_keep_their_suffix():

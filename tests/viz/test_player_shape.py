@@ -9,6 +9,7 @@ from a2g_jax.geometry.retarget.upright import upright_motion
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.io.bvh import read_bvh
 from a2g_jax.io.character import read_character
+from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.viz.player.roles import find_roles
 from a2g_jax.viz.player.shape import build_shape
 from a2g_jax.viz.player.stage import placement, shape_points
@@ -66,6 +67,19 @@ def test_extra_points_are_rigid_to_their_joints():
     for index, (joint, offset) in enumerate(shape.points[22:], start=22):
         apart = np.linalg.norm(points[:, index] - points[:, joint], axis=1)
         np.testing.assert_allclose(apart, np.linalg.norm(offset), atol=1e-5)
+
+
+def test_faces_are_nearly_level_at_rest():
+    """Backs lean at rest, and joints of heads are behind their tops."""
+    ends = ((15, (0.0, 0.18, 0.02)),)
+    for skeleton in (TALKER_SKELETON, replace(TALKER_SKELETON, ends=ends), body_skeleton()):
+        rotations = np.tile(np.eye(3, dtype=np.float32), (1, skeleton.joints, 1, 1))
+        motion = Motion(rotations, np.zeros((1, 3), np.float32), skeleton, 30.0)
+        shape = build_shape(skeleton)
+        origin, up, left, right = shape.frames[shape.cones[[s.tint for s in shape.cones].index("eye")].start[0]]
+        points = shape_points(motion, shape)[0]
+        front = np.cross(points[left] - points[right], points[up] - points[origin])
+        assert 0 < np.degrees(np.arcsin(front[1] / np.linalg.norm(front))) < 6
 
 
 def test_eyes_look_where_the_head_turns():

@@ -1,12 +1,14 @@
 """Films with sound."""
 
 import subprocess
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
-from a2g_jax.errors import InputError
+from a2g_jax.errors import InputError, Interrupted
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.progress import watched
 from a2g_jax.talker.skeleton import TALKER_SKELETON
 from a2g_jax.viz.player import video
 
@@ -66,7 +68,7 @@ def test_a_missing_program_is_named_with_the_remedy(program, tmp_path, monkeypat
 def test_an_encoder_that_fails_is_an_error_and_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(video, "check_video", lambda: None)
     monkeypatch.setattr(video, "find_ffmpeg", lambda: "false")
-    monkeypatch.setattr(video, "page_pictures", lambda page, times, script: iter([b"x" * 100_000] * len(times)))
+    monkeypatch.setattr(video, "page_pictures", lambda page, times, script: (b"x" * 100_000 for _ in times))
     with pytest.raises(InputError, match="ffmpeg could not encode"):
         video.write_video(tmp_path / "film.mp4", standing(), (), 16_000)
     assert list(tmp_path.iterdir()) == []
@@ -77,3 +79,42 @@ def test_films_of_hours_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(video, "MOST_FRAMES", 5)
     with pytest.raises(InputError, match="5 at most"):
         video.write_video(tmp_path / "film.mp4", standing(), (), 16_000)
+
+
+def drawn_until(frame, error):
+    """A replacement of ``page_pictures`` that fails at a frame."""
+
+    def pictures(page, times, script):
+        for number in range(len(times)):
+            if number == frame:
+                raise error
+            yield b"x" * 1000
+
+    return pictures
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt(), Interrupted("cancelled")])
+def test_an_interrupted_film_leaves_nothing(tmp_path, monkeypatch, interruption):
+    monkeypatch.setattr(video, "check_video", lambda: None)
+    monkeypatch.setattr(video, "find_ffmpeg", lambda: "cat")
+    monkeypatch.setattr(video, "page_pictures", drawn_until(3, interruption))
+    with pytest.raises(type(interruption)):
+        video.write_video(tmp_path / "film.mp4", standing(), (), 16_000)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("server", [False, True])
+def test_frames_are_counted_on_a_bar_or_by_the_server_that_watches(tmp_path, monkeypatch, capsys, server):
+    monkeypatch.setattr(video, "check_video", lambda: None)
+    monkeypatch.setattr(video, "page_pictures", drawn_until(8, None))
+    monkeypatch.setattr(video, "_encoder", lambda path, fps, speech: path.open("wb"))
+    steps = []
+    with watched(lambda *step: steps.append(step)) if server else nullcontext():
+        video.write_video(tmp_path / "film.mp4", standing(), (), 16_000)
+    shown = capsys.readouterr().err
+    if server:
+        assert steps == [(done, 8, "frame") for done in range(1, 9)]
+        assert shown == ""
+    else:
+        assert "drawing film.mp4" in shown
+        assert "8/8" in shown

@@ -8,6 +8,8 @@ from a2g_jax.errors import InputError
 from a2g_jax.io.gltf.container import Glb, fail
 
 _SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+_WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+_KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _TYPES = {"float32": 5126, "uint32": 5125, "uint16": 5123, "uint8": 5121}
 
 
@@ -42,6 +44,43 @@ def read_matrices(glb: Glb, index: object, count: int, place: str) -> np.ndarray
         fail(glb.path, place, "NaN or infinity in a matrix: the file is damaged; export it again.")
     # Columns first in the file.
     return np.swapaxes(rows, -1, -2)
+
+
+def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray | None:
+    """The elements of an accessor, (count,) or (count, width), normalised ones from -1 or 0 to 1.
+
+    None where they are sparse, compressed or in another file.
+
+    Args:
+        shape: ``SCALAR``, ``VEC3`` or ``VEC4``.
+        place: of the accessor in the file, for messages.
+
+    Raises:
+        InputError: there is no such accessor, it is of another type, or lies outside the file.
+    """
+    accessor = item(glb, "accessors", index, place)
+    component = accessor.get("componentType")
+    kind = _KINDS.get(component) if isinstance(component, int) else None
+    if accessor.get("type") != shape or kind is None:
+        fail(glb.path, place, f"expected {shape}; the file is damaged: export it again.")
+    count = _whole(glb, accessor.get("count"), place)
+    if "sparse" in accessor or "bufferView" not in accessor:
+        return None
+    view = item(glb, "bufferViews", accessor["bufferView"], place)
+    if view.get("buffer") != 0 or "uri" in item(glb, "buffers", 0, place) or view.get("extensions"):
+        return None
+    width = _WIDTHS[shape]
+    size = np.dtype(kind).itemsize
+    begin = _whole(glb, view.get("byteOffset", 0), place) + _whole(glb, accessor.get("byteOffset", 0), place)
+    step = _whole(glb, view.get("byteStride", 0), place) or size * width
+    if count and (step < size * width or begin + step * (count - 1) + size * width > len(glb.binary)):
+        fail(glb.path, place, "lies outside the binary data: the file is damaged; export it again.")
+    rows = np.ndarray((count, width), kind, glb.binary, begin, (step, size)) if count else np.zeros((0, width))
+    largest = {"<u1": 255, "<i1": 127, "<u2": 65535, "<i2": 32767}.get(kind)
+    values = rows.astype(np.float64)
+    if accessor.get("normalized") is True and largest:
+        values = np.maximum(values / largest, -1.0)
+    return values[:, 0] if shape == "SCALAR" else values
 
 
 def item(glb: Glb, key: str, index: object, place: str) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.gltf.animation import Animation, continuous_quaternions, node_tracks
 from a2g_jax.io.gltf.buffers import Buffer
 from a2g_jax.io.gltf.container import read_glb, write_glb
+from a2g_jax.io.gltf.figure import Surface
+from a2g_jax.io.gltf.mesh import read_surfaces
 from a2g_jax.io.gltf.nodes import read_nodes
 from a2g_jax.io.gltf.rig import find_node_rig
 
@@ -51,6 +53,14 @@ class GlbCharacter:
         if outside:
             found.append(f"{self.path}: has textures in other files ({outside[0]}); copy them beside what is written")
         return found
+
+    def surfaces(self) -> list[Surface]:
+        """The meshes in the reference pose, in plain axes and metres; empty where they are compressed.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        return read_surfaces(self._glb, self._found, self.metres)
 
     def write(self, path: Path, motion: Motion) -> dict[str, float]:
         """Write the file with the motion as its first animation; nothing is approximated, so nothing is returned.

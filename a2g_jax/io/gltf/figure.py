@@ -31,6 +31,8 @@ class Surface:
     weights: Float[np.ndarray, "V 4"]
     """Of the joints; their sum is 1."""
     triangles: Int[np.ndarray, "F 3"]
+    two_sided: bool = False
+    """Whether triangles are seen from behind as well."""
 
 
 def figure_document(

@@ -10,8 +10,9 @@ from a2g_jax.generation.delivery import Delivery
 from a2g_jax.generation.live.stream import Stream
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.serving.live.protocol import with_header
-from a2g_jax.viz.player.page import drawn_body
+from a2g_jax.viz.player.page import drawn_body, drawn_mesh
 from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.skin import bind
 from a2g_jax.viz.player.stage import shape_points
 
 #: Least share of its height that arms of a figure reach to either side.
@@ -35,7 +36,12 @@ class Drawn:
         self.own = still.shown if still.own is None else still.own
         self.metres = 1.0 if delivery.character is None else float(delivery.character.metres)
         self._still = still.shown
-        self._shape = build_shape(still.shown.skeleton)
+        skin = delivery.skin(still.shown.skeleton)
+        self._bound = None if skin is None else bind(skin)
+        self._body, _ = drawn_body(self._still)
+        self._shape = build_shape(self._still.skeleton)
+        if self._bound is not None:
+            self._body, self._shape = drawn_mesh(self._body, self._bound)
 
     def encoded(self, encode: Callable[[Motion, int], Any]) -> Callable[[Motion, int], Any]:
         """A function that encodes frames of the stream as those of the client's skeleton."""
@@ -55,6 +61,10 @@ class Drawn:
     def figure(self) -> dict[str, Any]:
         """What a page needs to draw the body, and its points at rest."""
         points = shape_points(self._still, self._shape)
-        body = drawn_body(self._still, self._shape, points)
-        body["place"]["reach"] = max(body["place"]["reach"], round(_REACH * body["place"]["height"], 4))
-        return {**body, "label": "", "note": "", "rest": points[0].round(5).reshape(-1).tolist()}
+        place = dict(self._body["place"])
+        place["reach"] = max(place["reach"], round(_REACH * place["height"], 4))
+        return {**self._body, "place": place, "label": "", "note": "", "rest": points[0].round(5).reshape(-1).tolist()}
+
+    def mesh(self) -> dict[str, Any] | None:
+        """The mesh of the character, whose bones are the axes of the figure; None without one."""
+        return None if self._bound is None else self._bound.encoded()

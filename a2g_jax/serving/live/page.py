@@ -17,7 +17,7 @@ from a2g_jax.serving.live.session import live
 from a2g_jax.viz.player.page import fill_template, scripts, style
 
 #: Parts of the written page's script that draw, and the page's own.
-_PLAYER = ("math", "figures", "shaders", "webgl", "canvas", "layout", "controls")
+_PLAYER = ("math", "unpack", "figures", "shaders", "soup", "shadows", "webgl", "canvas", "layout", "controls")
 _OWN = ("live_figure", "live_pace", "live_stage", "live")
 #: Look-ahead of the quick choice on the page, seconds.
 QUICK = 0.5
@@ -33,6 +33,7 @@ def routes(service: Service, name: str) -> list[BaseRoute]:
     async def answer(websocket: WebSocket) -> None:
         await live(websocket, service)
 
+    drawn = Drawn(service.default, service.delivery)
     own = "\n".join(_template(f"{part}.js") for part in _OWN)
     return [
         static("/", page(service, name)),
@@ -40,7 +41,7 @@ def routes(service: Service, name: str) -> list[BaseRoute]:
         static("/live.css", _template("live.css")),
         static("/live.js", f'(() => {{\n"use strict";\n{scripts(_PLAYER)}\n{own}\n}})();\n'),
         static("/capture.js", _template("capture.js")),
-        static("/figure.json", json.dumps(Drawn(service.default, service.delivery).figure())),
+        static("/figure.json", json.dumps({**drawn.figure(), "mesh": drawn.mesh()})),
         WebSocketRoute("/live", answer),
     ]
 

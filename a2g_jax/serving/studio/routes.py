@@ -14,14 +14,15 @@ from starlette.background import BackgroundTask
 from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import BaseRoute, Route
+from starlette.types import Receive, Scope, Send
 
 from a2g_jax.errors import InputError
 from a2g_jax.serving.app import make_app, static
 from a2g_jax.serving.security import Guard, Security
 from a2g_jax.serving.studio.jobs import DONE
+from a2g_jax.serving.studio.sample_formats import slow_formats
 from a2g_jax.serving.studio.settings import FieldError
 from a2g_jax.serving.studio.studio import Studio
-from a2g_jax.serving.studio.takes import slow_formats
 
 #: Files of the page, in the folder ``page``.
 PAGE_FILES = (
@@ -123,7 +124,6 @@ class _Api:
     async def upload(self, request: Request) -> Response:
         """The body is the file, and the header ``X-File-Name`` its name, percent-encoded."""
         name = unquote(request.headers.get("x-file-name", ""))
-        await _thread(self.studio.make_room_for_files)
         with self.studio.uploads.incoming(request.path_params["kind"], name) as incoming:
             async for data in request.stream():
                 if data:
@@ -188,26 +188,41 @@ class _Api:
         """The state whenever it changes, and every second while something is worked on."""
         if self._streams >= MOST_STREAMS:
             raise InputError(f"{MOST_STREAMS} pages of this studio are open already; close one.")
-        return StreamingResponse(self._events(request), media_type="text/event-stream")
+        # Counted before anything is awaited, so that requests at the same time are not more than the limit.
+        self._streams += 1
+        return _Stream(self._events(request), self._closed)
+
+    def _closed(self) -> None:
+        self._streams -= 1
 
     async def _events(self, request: Request) -> AsyncIterator[str]:
-        self._streams += 1
+        version, quiet, sent = -1, 0.0, ""
+        while not await request.is_disconnected():
+            if version != self.studio.version or (self.studio.busy and quiet >= 1.0):
+                version = self.studio.version
+                text = json.dumps(self.studio.state(), separators=(",", ":"))
+                if text != sent:
+                    yield f"data: {text}\n\n"
+                    sent, quiet = text, 0.0
+            elif quiet >= BEAT:
+                yield ": \n\n"
+                quiet = 0.0
+            await asyncio.sleep(LOOK)
+            quiet += LOOK
+
+
+class _Stream(StreamingResponse):
+    """Server-sent events; calls a function when they end, also where none was sent."""
+
+    def __init__(self, events: AsyncIterator[str], ended: Callable[[], None]) -> None:
+        super().__init__(events, media_type="text/event-stream")
+        self._ended = ended
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
-            version, quiet, sent = -1, 0.0, ""
-            while not await request.is_disconnected():
-                if version != self.studio.version or (self.studio.busy and quiet >= 1.0):
-                    version = self.studio.version
-                    text = json.dumps(self.studio.state(), separators=(",", ":"))
-                    if text != sent:
-                        yield f"data: {text}\n\n"
-                        sent, quiet = text, 0.0
-                elif quiet >= BEAT:
-                    yield ": \n\n"
-                    quiet = 0.0
-                await asyncio.sleep(LOOK)
-                quiet += LOOK
+            await super().__call__(scope, receive, send)
         finally:
-            self._streams -= 1
+            self._ended()
 
 
 async def _thread(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -31,12 +31,14 @@ _FIELDS = {
     "--style": "style",
     "--style-audio": "style",
     "--style-share": "style",
+    "--style-with": "style_with",
+    "--style-mix": "style_with",
     "--seed-clip": "continue",
     "--to": "character",
 }
 _KNOWN = {
-    "speech", "system", "samples", "seed", "emotion", "controls", "pins", "style", "style_share", "continue",
-    "character", "settings",
+    "speech", "system", "samples", "seed", "emotion", "controls", "pins", "style", "style_share", "style_with",
+    "style_mix", "continue", "character", "settings",
 }  # fmt: skip
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,40}")
 
@@ -105,6 +107,10 @@ def read_request(
         arguments.append(f"--style={style}")
         if values.get("style_share") is not None:
             arguments.append(f"--style-share={_number(values['style_share'], 'style'):g}")
+    if (second := file("style_with", "clip")) is not None:
+        arguments.append(f"--style-with={second}")
+        if values.get("style_mix") is not None:
+            arguments.append(f"--style-mix={_number(values['style_mix'], 'style_with'):g}")
     if (clip := file("continue", "clip")) is not None:
         arguments.append(f"--seed-clip={clip}")
     formats = "npz"

@@ -2,7 +2,6 @@
 
 import re
 import secrets
-import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -18,18 +17,10 @@ from a2g_jax.io.temporary import remove, temporary_path
 from a2g_jax.io.words import Word
 from a2g_jax.serving.studio.jobs import DONE, Job, Jobs
 from a2g_jax.serving.studio.readers import KINDS
+from a2g_jax.serving.studio.sample_formats import formats, missing_programs, slow_formats
 from a2g_jax.serving.studio.settings import MOST_SAMPLES, Request, field_of, read_request
-from a2g_jax.serving.studio.takes import (
-    MOST_STARS,
-    Generate,
-    Outcome,
-    Take,
-    formats,
-    missing_programs,
-    slow_formats,
-    takes_page,
-    with_client_names,
-)
+from a2g_jax.serving.studio.takes import MOST_STARS, Generate, Outcome, Take, with_client_names
+from a2g_jax.serving.studio.takes_page import takes_page
 from a2g_jax.serving.studio.uploads import Kind, Upload, Uploads
 
 #: Takes that are kept; the oldest without stars make room, then the oldest.
@@ -78,7 +69,7 @@ class Studio:
         self.folder = temporary_path(Path(tempfile.gettempdir()) / "studio")
         self.folder.mkdir(mode=0o700)
         (self.folder / "uploads").mkdir()
-        self.uploads = Uploads(self.folder / "uploads", self._kinds)
+        self.uploads = Uploads(self.folder / "uploads", self._kinds, in_use=self._in_use)
         self.jobs = Jobs()
         return self
 
@@ -179,7 +170,8 @@ class Studio:
     def _work(self, job: Job, take: Take) -> Outcome:
         take.folder.mkdir()
         try:
-            outcome = self._generate(take.request.arguments, take.folder, job)
+            with take.working():
+                outcome = self._generate(take.request.arguments, take.folder, job)
         except BaseException:
             remove(take.folder)
             raise
@@ -209,7 +201,7 @@ class Studio:
         self.jobs.cancel(self.find(id).job)
 
     def drop(self, id: str) -> None:
-        """Remove a take with its files; its work is cancelled first.
+        """Remove a take with its files; its work is cancelled, and leaves nothing when it ends.
 
         Raises:
             InputError: it is no longer kept.
@@ -217,9 +209,8 @@ class Studio:
         take = self.find(id)
         for job in (take.job, *take.films.values()):
             self.jobs.cancel(job)
-            self.jobs.wait(job, 30.0)
         self.takes.pop(id, None)
-        remove(take.folder)
+        take.remove()
         self._changes += 1
 
     def rate(self, id: str, stars: Any) -> None:
@@ -292,10 +283,9 @@ class Studio:
         """Whether any job waits or runs."""
         return any(take.busy for take in list(self.takes.values()))
 
-    def make_room_for_files(self) -> None:
-        """Remove the oldest uploads over the limits that no waiting request names."""
-        used = [upload.path for take in list(self.takes.values()) if take.busy for upload in take.request.used]
-        self.uploads.drop_oldest(used)
+    def _in_use(self) -> list[Path]:
+        """The uploads that waiting requests name."""
+        return [upload.path for take in list(self.takes.values()) if take.busy for upload in take.request.used]
 
     def _make_room(self) -> None:
         ended = [take for take in list(self.takes.values()) if not take.busy]
@@ -303,4 +293,4 @@ class Studio:
             if len(self.takes) < self._most:
                 return
             del self.takes[take.id]
-            shutil.rmtree(take.folder, ignore_errors=True)
+            take.remove()

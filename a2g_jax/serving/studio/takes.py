@@ -2,25 +2,26 @@
 
 import threading
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from a2g_jax.errors import InputError
-from a2g_jax.generation.formats import PAGE, check_page_size, known_formats, motion_format
+from a2g_jax.generation.formats import motion_format
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import read_audio
 from a2g_jax.io.files import atomic_path, json_text
 from a2g_jax.io.npz import read_motion_npz
+from a2g_jax.io.temporary import remove
 from a2g_jax.io.words import Word
-from a2g_jax.plugins import load_object
 from a2g_jax.serving.studio.jobs import DONE, ENDED, Job
+from a2g_jax.serving.studio.sample_formats import formats, slow_formats
 from a2g_jax.serving.studio.settings import Request, named
 from a2g_jax.serving.studio.uploads import Upload
 from a2g_jax.viz.player import Figure, Lane, Track
-from a2g_jax.viz.player.page import page_html
+from a2g_jax.viz.player.skin import Skin
 
 #: The speech of a take, in its folder.
 SPEECH = "speech.wav"
@@ -49,6 +50,8 @@ class Outcome:
     """The most important one in plain words; the page shows the others on request."""
     warning: str = ""
     """About the speech; shown at once."""
+    skin: Skin | None = None
+    """The mesh of the character that it was generated for."""
 
 
 #: Generates: the arguments of ``a2g generate``, the folder, and the job that progress is reported to.
@@ -71,6 +74,7 @@ class Take:
     films: dict[tuple[int, str], Job] = field(default_factory=dict)
     """Jobs of slow formats by sample and format."""
     _writing: threading.Lock = field(default_factory=threading.Lock)
+    _removed: bool = False
 
     @property
     def id(self) -> str:
@@ -131,10 +135,31 @@ class Take:
         assert found is not None
         path = self.folder / f"sample_{sample:02d}{found.suffix}"
         # Slow ones are written by the one worker, and must not keep the others waiting.
-        with nullcontext() if found.check else self._writing:
+        with nullcontext() if found.check else self._writing, self.working():
             if not path.exists():
-                found.write(path, self.motion(sample), self.speech() if found.sound else None)
+                speech = self.speech() if found.sound else None
+                found.write(path, self.motion(sample), speech, self.outcome.skin)
         return path
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        """A block that writes into the folder: if the take is removed meanwhile, so is what the block wrote.
+
+        Raises:
+            InputError: the take is removed.
+        """
+        try:
+            yield
+        finally:
+            if self._removed:
+                remove(self.folder)
+        if self._removed:
+            raise InputError("this take is no longer kept; generate it again.")
+
+    def remove(self) -> None:
+        """Remove the files; work that has not ended yet leaves none either."""
+        self._removed = True
+        remove(self.folder)
 
     def file_name(self, sample: int, format: str) -> str:
         """The name that a downloaded file gets."""
@@ -150,7 +175,8 @@ class Take:
         outcome = self.outcome
         note = outcome.notes[sample] if sample < len(outcome.notes) else ""
         tracks = outcome.tracks[sample] if sample < len(outcome.tracks) else ()
-        return Figure(self.motion(sample), label or f"sample {sample}", note, tracks, number=number)
+        motion = self.motion(sample)
+        return Figure(motion, label or f"sample {sample}", note, tracks, number=number, skin=outcome.skin)
 
     def order(self, by: str = "made") -> list[int]:
         """Samples in an order: ``made``, ``stars`` or ``score``, the best first."""
@@ -230,60 +256,6 @@ class Take:
 
 #: Sample rate of a take's speech, Hz: that of the models.
 SPEECH_RATE = 16_000
-
-
-def formats() -> tuple[str, ...]:
-    """Formats of a sample's files."""
-    return tuple(name for name in known_formats() if name != PAGE)
-
-
-def slow_formats() -> tuple[str, ...]:
-    """Formats that other programs write, which takes minutes: they are jobs."""
-    return tuple(name for name in formats() if (found := motion_format(name)) is not None and found.check)
-
-
-def missing_programs() -> dict[str, str]:
-    """Why formats cannot be written here, by format."""
-    reasons = {}
-    for name in slow_formats():
-        found = motion_format(name)
-        assert found is not None
-        try:
-            load_object(found.check, "check")()
-        except InputError as error:
-            reasons[name] = str(error)
-    return reasons
-
-
-def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
-    """The page of samples side by side, of one take or several of the same speech: that of ``a2g generate``.
-
-    Raises:
-        InputError: no samples, samples of different speeches, or too many for a browser.
-    """
-    chosen = list(shown)
-    if not chosen:
-        raise InputError("choose samples to look at.")
-    takes = list(dict.fromkeys(take for take, _ in chosen))
-    if len({take.request.speech.id for take in takes}) > 1:
-        raise InputError("samples of different speeches cannot be played together; choose takes of one speech.")
-    first, several = takes[0], len(takes) > 1
-    label = "take {}, sample {}" if several else "sample {1}"
-    figures = [
-        take.figure(sample, label.format(take.number, sample), None if several else sample) for take, sample in chosen
-    ]
-    longest = max(figures, key=lambda figure: figure.motion.frames * figure.motion.skeleton.joints).motion
-    check_page_size(len(figures), longest.frames, longest.skeleton.joints)
-    audio, rate = first.speech()
-    return page_html(
-        figures,
-        audio,
-        rate,
-        title=title,
-        subtitle="" if several else first.outcome.subtitle,
-        words=first.words,
-        lanes=[lane for take in takes for lane in take.outcome.lanes],
-    )
 
 
 def with_client_names(outcome: Outcome, used: Sequence[Upload]) -> Outcome:

@@ -41,6 +41,8 @@ class Upload:
     """The client's, shortened; for people alone."""
     path: Path
     about: Mapping[str, Any] = field(default_factory=dict)
+    size: int = 0
+    """Bytes."""
     keep: bool = False
     """Whether it comes with the package, and never makes room."""
 
@@ -53,16 +55,25 @@ class Uploads:
     """The files of a studio."""
 
     def __init__(
-        self, folder: Path, kinds: Mapping[str, Kind], *, files: int = MOST_FILES, most_bytes: int = MOST_BYTES
+        self,
+        folder: Path,
+        kinds: Mapping[str, Kind],
+        *,
+        files: int = MOST_FILES,
+        most_bytes: int = MOST_BYTES,
+        in_use: Callable[[], Iterable[Path]] = tuple,
     ) -> None:
         """
         Args:
             folder: for the files; it is empty.
             kinds: by name.
+            in_use: the files that make no room.
         """
         self.folder, self.kinds = folder, kinds
-        self._files, self._bytes = files, most_bytes
+        self._files, self._bytes, self._in_use = files, most_bytes, in_use
         self._kept: dict[str, Upload] = {}
+        self._arriving: dict[str, int] = {}
+        """Bytes of files that arrive, by their identifiers."""
         self._lock = threading.Lock()
 
     def add(self, upload: Upload) -> None:
@@ -95,21 +106,34 @@ class Uploads:
         """All files, the oldest first."""
         return list(self._kept.values())
 
-    def drop_oldest(self, used: Iterable[Path] = ()) -> None:
-        """Remove the oldest files over the limits, apart from those in use."""
-        in_use = set(used)
+    def arrive(self, id: str, size: int) -> None:
+        """Count a file that arrives, with its bytes so far; the oldest files over the limits, of those that are not in
+        use, are removed.
+
+        Raises:
+            InputError: files that arrive and those in use are more than is kept.
+        """
+        in_use = set(self._in_use())
         with self._lock:
+            self._arriving[id] = size
             own = [upload for upload in self._kept.values() if not upload.keep]
-            total = sum(_size(upload.path) for upload in own)
-            count = len(own)
+            count = len(own) + len(self._arriving)
+            total = sum(upload.size for upload in own) + sum(self._arriving.values())
             for upload in own:
                 if count <= self._files and total <= self._bytes:
                     return
                 if upload.path in in_use:
                     continue
-                count, total = count - 1, total - _size(upload.path)
+                count, total = count - 1, total - upload.size
                 del self._kept[upload.id]
                 upload.path.unlink(missing_ok=True)
+            if count > self._files or total > self._bytes:
+                raise InputError("too many files arrive at the same time; wait for the others, and send it again.")
+
+    def arrived(self, id: str) -> None:
+        """Count a file as arriving no longer."""
+        with self._lock:
+            self._arriving.pop(id, None)
 
 
 class Incoming:
@@ -130,19 +154,25 @@ class Incoming:
     def __enter__(self) -> "Incoming":
         self._id = secrets.token_hex(8)
         self.path = self._uploads.folder / f"{PREFIX}{self._id}{self._suffix}"
-        self._file: IO[bytes] = self.path.open("xb")
+        try:
+            self._uploads.arrive(self._id, 0)
+            self._file: IO[bytes] = self.path.open("xb")
+        except BaseException:
+            self._uploads.arrived(self._id)
+            raise
         return self
 
     def write(self, data: bytes) -> None:
         """Append bytes.
 
         Raises:
-            InputError: the file has more than it may.
+            InputError: the file has more than it may, or too many arrive at the same time.
         """
         self._bytes += len(data)
         if self._bytes > self._most:
             megabytes = self._most // 1_000_000
             raise InputError(f"{self._name}: is larger than {megabytes} MB, the most that is taken; cut it first.")
+        self._uploads.arrive(self._id, self._bytes)
         self._file.write(data)
 
     def finish(self) -> Upload:
@@ -159,13 +189,15 @@ class Incoming:
         except InputError as error:
             raise InputError(self._plain(str(error))) from None
         about = {key: self._plain(value) for key, value in about.items()}
-        upload = Upload(self._id, self._kind, self._name, self.path, about)
+        upload = Upload(self._id, self._kind, self._name, self.path, about, self._bytes)
+        self._uploads.arrived(self._id)
         self._uploads.add(upload)
         self._done = True
         return upload
 
     def __exit__(self, *error: object) -> None:
         self._file.close()
+        self._uploads.arrived(self._id)
         if not self._done:
             self.path.unlink(missing_ok=True)
 
@@ -190,10 +222,3 @@ def display_name(name: str) -> str:
     clean = "".join(character for character in last if character.isprintable()).strip() or "file"
     stem, dot, suffix = clean.rpartition(".")
     return clean if len(clean) <= _LONGEST_NAME else f"{stem[: _LONGEST_NAME - len(suffix) - 2]}…{dot}{suffix[-20:]}"
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0

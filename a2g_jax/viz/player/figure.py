@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.viz.player.skin import Skin
 
 
 @dataclass(frozen=True)
@@ -112,3 +113,5 @@ class Figure:
     """Names of its files in the folder of the page, which offers them."""
     number: int | None = None
     """Picks the colour, so that it stays the same in any order of the figures; None for the place on the page."""
+    skin: Skin | None = None
+    """A character's mesh on the motion's skeleton, in place of the figure; the page has it once for all its figures."""

@@ -7,6 +7,11 @@ from a2g_jax.viz.player.hands import find_fingers, finger_radii, relaxed_hand
 from a2g_jax.viz.player.parts import Anchor, Shape
 from a2g_jax.viz.player.roles import Limb, Roles, rest_positions
 
+#: Cosine of the largest lean of a head at rest, 25 degrees, from which on its face is not made level.
+_UPRIGHT = 0.906
+#: Pitch of the face at rest, radians.
+_RAISED = 0.07
+
 
 class Mannequin:
     """Adds the parts of a person to a shape; sizes are those of a 1.7 m adult times ``size``."""
@@ -145,6 +150,12 @@ class Mannequin:
                 top = float(np.clip(length, 0.15 * size, 0.24 * size))
             else:
                 end = None
+        level = np.array([0.0, 1.0, 0.0])
+        if up @ level > _UPRIGHT:
+            # Backs lean, and tops of heads are not above their joints: at rest the face is nearly level nevertheless.
+            # It is a little raised, as people whose heads are lowered look up with their eyes, and these cannot turn.
+            front = np.cross(self.left, level)
+            up, end = np.cos(_RAISED) * level - np.sin(_RAISED) * front, None
         if end is None:
             end = shape.point(head, up * top)
         left = _unit(self.left - up * (self.left @ up), np.array([1.0, 0, 0]))

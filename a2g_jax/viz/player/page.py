@@ -4,7 +4,7 @@ import html
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
 import numpy as np
@@ -18,6 +18,7 @@ from a2g_jax.viz.player.encode import encode_positions
 from a2g_jax.viz.player.figure import Figure, Lane
 from a2g_jax.viz.player.parts import Shape
 from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.skin import Bound, bind
 from a2g_jax.viz.player.sound import encode_audio, playback_note
 from a2g_jax.viz.player.stage import placement, shape_points
 
@@ -27,6 +28,8 @@ _SCRIPTS = (
     "unpack",
     "figures",
     "shaders",
+    "soup",
+    "shadows",
     "webgl",
     "canvas",
     "layout",
@@ -106,8 +109,10 @@ def page_html(
         "duration": audio.size / sample_rate if audio.size else max(figure.motion.seconds for figure in figures),
         "words": [[word.text, word.start, word.end] for word in words],
         "lanes": [lane.encoded() for lane in lanes],
-        "figures": [_figure(figure) for figure in figures],
     }
+    bound = _bound(figures)
+    data["figures"] = [_figure(figure, bound) for figure in figures]
+    data["meshes"] = [one.encoded() for one in bound.values()]
     footer = " ".join(filter(None, (footer, playback_note(audio))))
     return fill_template(
         _template("page.html"),
@@ -150,14 +155,27 @@ def _lone(text: str) -> bool:
     return re.search("[\ud800-\udfff]", text) is not None
 
 
-def _figure(figure: Figure) -> dict:
+def _bound(figures: Sequence[Figure]) -> dict[int, Bound]:
+    """The meshes of the figures, each once, by the identity of their skins."""
+    skins = {id(figure.skin): figure.skin for figure in figures if figure.skin is not None}
+    return {
+        key: bind(skin, [figure.motion for figure in figures if figure.skin is skin and figure.motion.frames])
+        for key, skin in skins.items()
+    }
+
+
+def _figure(figure: Figure, bound: Mapping[int, Bound]) -> dict:
     motion = figure.motion
     if motion.frames == 0:
         raise InputError(f"figure {figure.label!r}: the motion has no frames; give it at least one.")
     if not motion.fps > 0:
         raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
-    shape = build_shape(motion.skeleton)
-    points = shape_points(motion, shape)
+    body, points = drawn_body(motion)
+    mesh = bound.get(id(figure.skin))
+    if mesh is not None:
+        body, shape = drawn_mesh(body, mesh)
+        points = shape_points(motion, shape)
+        body["mesh"] = list(bound).index(id(figure.skin))
     encoded = encode_positions(points, figure.label)
     return {
         "label": figure.label,
@@ -166,21 +184,35 @@ def _figure(figure: Figure) -> dict:
         "frames": motion.frames,
         "tracks": [track.encoded() for track in figure.tracks],
         "files": list(figure.files),
-        **drawn_body(motion, shape, points),
+        **body,
         **encoded,
     }
 
 
-def drawn_body(motion: Motion, shape: Shape, points: Float[np.ndarray, "T P 3"]) -> dict:
-    """What the page needs to draw a body at any positions of its points: cones between them, and its place."""
+def drawn_body(motion: Motion) -> tuple[dict, Float[np.ndarray, "T P 3"]]:
+    """What the page needs to draw our figure at any positions of its points, cones between them and its place; and the
+    points."""
+    shape = build_shape(motion.skeleton)
+    points = shape_points(motion, shape)
+    about = {"fps": motion.fps, "joints": list(motion.skeleton.names), "place": placement(motion, points)}
+    return {**about, **drawn_shape(shape)}, points
+
+
+def drawn_mesh(body: dict, mesh: Bound) -> tuple[dict, Shape]:
+    """What the page needs to draw a mesh in place of our figure, and the shape whose points it needs."""
+    shape = mesh.shape()
+    tall = round(float(np.ptp(mesh.skin.places[:, 1])), 4)
+    place = {**body["place"], "height": max(body["place"]["height"], tall)}
+    return {**body, **drawn_shape(shape), "place": place}, shape
+
+
+def drawn_shape(shape: Shape) -> dict:
+    """A shape as JSON for the page."""
     return {
-        "fps": motion.fps,
-        "joints": list(motion.skeleton.names),
         "points": len(shape.points),
         "axes": shape.frames,
         "shapes": [cone.encoded() for cone in shape.cones],
         "wrists": list(shape.wrists),
-        "place": placement(motion, points),
     }
 
 

@@ -14,16 +14,15 @@ _KEEP_FLOOR = 0.12
 
 
 def shape_points(motion: Motion, shape: Shape) -> Float[np.ndarray, "T P 3"]:
-    """World positions of the joints, then of the points that are rigid to them, metres."""
-    joints = motion.positions().astype(np.float64)
-    extra = shape.points[motion.skeleton.joints :]
-    if not extra:
-        return joints
-    owners = np.array([joint for joint, _ in extra])
-    offsets = np.array([offset for _, offset in extra])
-    rotations = motion.world_rotations().astype(np.float64)
-    moved = np.einsum("tpij,pj->tpi", rotations[:, owners], offsets)
-    return np.concatenate([joints, joints[:, owners] + moved], axis=1)
+    """World positions of the points of a shape, metres."""
+    owners = np.array([joint for joint, _ in shape.points])
+    offsets = np.array([offset for _, offset in shape.points])
+    points = motion.positions().astype(np.float64)[:, owners]
+    away = np.flatnonzero(offsets.any(axis=1))
+    if len(away):
+        rotations = motion.world_rotations().astype(np.float64)
+        points[:, away] += np.einsum("tpij,pj->tpi", rotations[:, owners[away]], offsets[away])
+    return points
 
 
 def placement(motion: Motion, points: Float[np.ndarray, "T P 3"]) -> dict:

@@ -5,8 +5,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,10 +17,11 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.files import atomic_path
-from a2g_jax.progress import checkpoint
+from a2g_jax.progress import counted_steps
 from a2g_jax.viz.player.figure import Figure
 from a2g_jax.viz.player.page import write_page
 from a2g_jax.viz.player.screenshot import BROWSER_ARGUMENTS, find_browser
+from a2g_jax.viz.player.skin import Skin
 
 #: Width and height of the picture, pixels. The page draws stills at twice the pixels of its window without a GPU.
 SIZE = 720
@@ -81,17 +82,23 @@ def check_video() -> None:
 
 
 def write_video(
-    path: str | os.PathLike[str], motion: Motion, audio: Float[np.ndarray, " N"] | tuple[()], sample_rate: int
+    path: str | os.PathLike[str],
+    motion: Motion,
+    audio: Float[np.ndarray, " N"] | tuple[()],
+    sample_rate: int,
+    skin: Skin | None = None,
 ) -> None:
     """Write a motion with its speech as MP4 (H.264, AAC), a picture for each frame of the motion, 720 x 720 pixels.
 
     Args:
         audio: mono samples in -1 to 1; empty for a silent film.
         sample_rate: of the audio, Hz.
+        skin: mesh of a character on the motion's skeleton, in place of our figure.
 
     Raises:
         InputError: a program is missing or fails, or the film would be too long.
         OutputError: the file cannot be written.
+        KeyboardInterrupt: Ctrl-C; nothing is left of the film.
     """
     check_video()
     if motion.frames > MOST_FRAMES:
@@ -99,21 +106,25 @@ def write_video(
     sound = np.asarray(audio, np.float32)
     with atomic_path(path) as temporary, tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.html"
-        write_page(page, [Figure(motion, "")], sound[:0], sample_rate, title="")
+        write_page(page, [Figure(motion, "", skin=skin)], sound[:0], sample_rate, title="")
         speech = None
         if sound.size:
             speech = Path(folder) / "speech.wav"
             write_audio(speech, sound, sample_rate)
-        with _encoder(temporary, motion.fps, speech) as pictures:
-            drawn = page_pictures(page, np.arange(motion.frames) / motion.fps, script=_NEAR)
-            for done, picture in enumerate(drawn, start=1):
+        times = np.arange(motion.frames) / motion.fps
+        with (
+            _encoder(temporary, motion.fps, speech) as pictures,
+            counted_steps(motion.frames, f"drawing {Path(path).name}", "frame") as step,
+            closing(page_pictures(page, times, script=_NEAR)) as drawn,
+        ):
+            for picture in drawn:
                 pictures.write(picture)
-                checkpoint(done, motion.frames, "frame")
+                step()
 
 
 def page_pictures(
     page: Path, times: Iterable[float], width: int = SIZE, height: int = SIZE, script: str = ""
-) -> Iterator[bytes]:
+) -> Generator[bytes, None, None]:
     """The figures of a page at some moments, as JPEG.
 
     Args:
@@ -127,7 +138,10 @@ def page_pictures(
 
     with sync_playwright() as playwright:
         try:
-            browser = playwright.chromium.launch(executable_path=find_browser(), args=list(BROWSER_ARGUMENTS))
+            # Ctrl-C reaches this process, which closes the browser itself.
+            browser = playwright.chromium.launch(
+                executable_path=find_browser(), args=list(BROWSER_ARGUMENTS), handle_sigint=False
+            )
             try:
                 view = browser.new_page(viewport={"width": width // 2, "height": height // 2}, color_scheme="light")
                 view.goto(page.resolve().as_uri())

@@ -20,7 +20,10 @@ class Live {
     this.toggle("echo", (on) => { if (this.gain) this.gain.gain.value = on ? 1 : 0; });
     at("ahead").addEventListener("change", () => { if (this.state !== "idle") { this.stop(""); this.start(); } });
     this.stage.ticking = (stamp) => this.tick(stamp);
-    this.ready = fetch("/figure.json").then((reply) => reply.json()).then((figure) => { this.stage.show(new LiveFigure(figure)); });
+    this.ready = fetch("/figure.json").then((reply) => reply.json()).then(async (figure) => {
+      this.mesh = figure.mesh ? await unpackMesh(figure.mesh, 0) : null;
+      this.stage.show(new LiveFigure(figure, this.mesh));
+    });
     this.ready.catch(() => this.say("The server does not answer.", true));
   }
 
@@ -93,7 +96,7 @@ class Live {
   listen(message, rate) {
     const { context } = this, source = context.createMediaStreamSource(this.microphone), capture = new AudioWorkletNode(context, "capture");
     this.latency = message.latency.total;
-    this.figure = new LiveFigure(message.figure);
+    this.figure = new LiveFigure(message.figure, this.mesh);
     this.playhead = new Playhead(SHOWN_BEHIND);
     this.stage.show(this.figure);
     this.frames = this.sent = 0;

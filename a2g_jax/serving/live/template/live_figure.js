@@ -1,8 +1,8 @@
 // A figure whose frames arrive one after the other: the last seconds are kept, for interpolation and trails.
 
 class LiveFigure extends Figure {
-  constructor(data) {
-    super({ ...data, frames: 1 }, Float32Array.from(data.rest), 0);
+  constructor(data, mesh) {
+    super({ ...data, frames: 1 }, Float32Array.from(data.rest), 0, mesh);
     this.room = Math.ceil(3 * this.fps);
     this.first = 0;
   }

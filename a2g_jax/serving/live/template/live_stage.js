@@ -46,7 +46,7 @@ class LiveStage {
     const theme = THEMES[this.scheme.matches ? "dark" : "light"], [band] = this.bands, { figure } = this;
     placeCamera(band, this.camera);
     figure.update(this.time, this.camera.yaw, band.slots[0], theme, this.trails);
-    band.figures = [{ capsules: figure.capsules, count: figure.count, shapes: figure.shapeList.length, thick: figure.thick, shaders: figure.shaders }];
+    band.figures = [figure.drawn];
     const ratio = Math.min(window.devicePixelRatio || 1, 2), moving = this.renderer.scale;
     if (still) this.renderer.scale = this.renderer.software && ratio < 2 ? 2 : 1;
     this.renderer.render({ bands: this.bands, width, height, ratio, theme, yaw: this.camera.yaw, overlay: false, still });

@@ -17,12 +17,12 @@ export async function beginForm(about, onTake) {
   });
   lane = new PinLane((pin) => { pin.input.value = pin.start; });
   lane.setSpeech(speech());
-  for (const id of ["pin", "style", "continue"]) find(`${id}-file`).accept = about.accept.clip;
+  for (const id of ["pin", "style", "style-with", "continue"]) find(`${id}-file`).accept = about.accept.clip;
   find("character-file").accept = about.accept.character;
   find("samples").max = about.most_samples;
   onFile("pin-file", (file) => addPin(file));
-  for (const name of ["style", "continue", "character"]) onFile(`${name}-file`, (file) => takeFile(name, file));
-  find("style-share").addEventListener("input", ({ target }) => { target.nextElementSibling.textContent = number(Number(target.value)); });
+  for (const name of ["style", "style-with", "continue", "character"]) onFile(`${name}-file`, (file) => takeFile(name, file));
+  for (const id of ["style-share", "style-mix"]) find(id).addEventListener("input", ({ target }) => { target.nextElementSibling.textContent = number(Number(target.value)); });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => { const field = find("samples"); field.value = Math.min(Math.max(Number(field.value) + Number(button.dataset.step), 1), about.most_samples); });
   find("dice").addEventListener("click", () => { find("seed").value = Math.floor(Math.random() * 100000); });
   find("systems").replaceChildren(...about.systems.map((name) => make("button", { type: "button", role: "radio", class: "chip", "aria-checked": "false", "data-name": name, onclick: () => chooseSystem(name) }, about.titles[name] || name, about.titles[name] && make("span", { class: "soft" }, `(${name})`))));
@@ -83,7 +83,7 @@ function summaries() {
   say("controls-section", set.length ? set.join(", ") : "free");
   say("pins-section", state.pins.length ? `${state.pins.length}` : "none");
   say("character-section", state.files.character?.name || "none");
-  say("more", [...Object.keys(state.files).filter((name) => name !== "character"), ...state.settings.keys()].join(", "));
+  say("more", [...Object.keys(state.files).filter((name) => name !== "character").map((name) => (name === "style-with" ? "blend" : name)), ...state.settings.keys()].join(", "));
 }
 
 function fillSettings(settings) {
@@ -96,7 +96,7 @@ function fillSettings(settings) {
     if (setting.kind === "bool") input = make("input", { type: "checkbox", checked: setting.value, onchange: () => change(input.checked === setting.value ? null : input.checked) });
     else input = make("input", { type: setting.kind === "str" ? "text" : "number", step: "any", placeholder: usual, oninput: () => change(input.value.trim() === "" ? null : setting.repeat ? input.value.split(";").map((part) => part.trim()).filter(Boolean) : input.value.trim()) });
     return make("div", { class: "setting", "data-part": `settings.${setting.name}` },
-      make("label", { class: setting.kind === "bool" ? "check" : "" }, make("span", {}, setting.name.replaceAll("-", " ")), input), make("p", { class: "hint soft" }, setting.about.replaceAll(/:\w+:`[^`]*`/g, "")), make("p", { class: "error", role: "alert" }));
+      make("label", { class: setting.kind === "bool" ? "check" : "" }, make("span", {}, setting.name.replaceAll("-", " ")), input), make("p", { class: "hint soft" }, setting.about.replaceAll(/ \(:\w+:`[^`]*`\)|:\w+:`[^`]*`/g, "")), make("p", { class: "error", role: "alert" }));
   }));
 }
 
@@ -135,7 +135,7 @@ function showPins() {
 }
 
 async function takeFile(name, file) {
-  const sent = await sendFile(name, name === "character" ? "character" : "clip", file);
+  const sent = await sendFile(name.replace("-", "_"), name === "character" ? "character" : "clip", file);
   if (sent) setFile(name, sent);
 }
 
@@ -144,7 +144,8 @@ function setFile(name, sent) {
   const shown = find(`${name}-name`);
   shown.hidden = !sent;
   shown.replaceChildren(...(sent ? [make("b", {}, sent.name), make("button", { type: "button", class: "icon", "aria-label": `Without ${sent.name}`, onclick: () => setFile(name, null) }, "×")] : []));
-  if (name === "style") find("style-share-row").hidden = !sent;
+  find("style-share-row").hidden = find("style-with-part").hidden = !state.files.style;
+  find("style-mix-row").hidden = !state.files["style-with"];
   summaries();
 }
 
@@ -161,7 +162,7 @@ function emotionText() {
 }
 
 export function request() {
-  const can = described.get(state.system) || {}, files = state.files;
+  const can = described.get(state.system) || {}, files = state.files, blends = can.styles && files.style && files["style-with"];
   return {
     speech: speech().id,
     system: state.system,
@@ -172,6 +173,8 @@ export function request() {
     pins: can.pins ? state.pins.map(({ clip, start, length }) => ({ clip: clip.id, start, length })) : [],
     style: can.styles ? files.style?.id : undefined,
     style_share: can.styles && files.style ? Number(find("style-share").value) : undefined,
+    style_with: blends ? files["style-with"].id : undefined,
+    style_mix: blends ? Number(find("style-mix").value) : undefined,
     continue: can.seed_clips ? files.continue?.id : undefined,
     character: files.character?.id,
     settings: Object.fromEntries(state.settings),

@@ -3,8 +3,10 @@
 const STRIDE = 16; // numbers of one capsule: start, radius; end, radius; axis, flatness; colour, gloss
 
 class Figure {
-  constructor(data, positions, index) {
+  // `mesh`: an unpacked skinned mesh, drawn in place of the shapes; its bones are the axes.
+  constructor(data, positions, index, mesh) {
     Object.assign(this, data);
+    this.mesh = mesh ? { ...mesh, places: new Float32Array(3 * mesh.count), normals: new Float32Array(3 * mesh.count) } : null;
     this.index = index;
     this.colour = PALETTE[(data.number ?? index) % PALETTE.length];
     this.positions = positions;
@@ -60,6 +62,7 @@ class Figure {
     for (let k = 0; k < n; k += 3)
       stage(mix(p[a + k], p[b + k], w), mix(p[a + k + 1], p[b + k + 1], w), mix(p[a + k + 2], p[b + k + 2], w), pose, k);
     this.axes.forEach((axes, k) => this.orient(axes, this.axesNow[k]));
+    if (this.mesh) this.skin();
     const tints = this.tints(theme);
     let o = 0;
     for (const shape of this.shapeList) {
@@ -72,6 +75,37 @@ class Figure {
     }
     this.count = this.shapeList.length;
     if (trails) this.trail(time, stage, o);
+  }
+
+  // Linear blend skinning: places and normals of the mesh, from the axes of its bones.
+  skin() {
+    const { count, bind, facing, bones, weights, centres, places, normals } = this.mesh;
+    const moves = this.moves || (this.moves = new Float32Array(12 * this.axes.length));
+    this.axesNow.forEach((m, k) => {
+      const o = 12 * k, x = centres[3 * k], y = centres[3 * k + 1], z = centres[3 * k + 2];
+      moves.set(m, o);
+      for (let i = 0; i < 3; i++) moves[o + 9 + i] -= m[i] * x + m[3 + i] * y + m[6 + i] * z;
+    });
+    const b = new Float32Array(12);
+    for (let i = 0; i < count; i++) {
+      b.fill(0);
+      for (let k = 4 * i; k < 4 * i + 4; k++) {
+        const w = weights[k];
+        if (w === 0) continue;
+        const o = 12 * bones[k];
+        for (let j = 0; j < 12; j++) b[j] += w * moves[o + j];
+      }
+      const o = 3 * i, x = bind[o], y = bind[o + 1], z = bind[o + 2], u = facing[o], v = facing[o + 1], s = facing[o + 2];
+      for (let k = 0; k < 3; k++) {
+        places[o + k] = b[k] * x + b[3 + k] * y + b[6 + k] * z + b[9 + k];
+        normals[o + k] = b[k] * u + b[3 + k] * v + b[6 + k] * s;
+      }
+    }
+  }
+
+  // What a renderer needs.
+  get drawn() {
+    return { capsules: this.capsules, count: this.count, shapes: this.shapeList.length, thick: this.thick, shaders: this.shaders, mesh: this.mesh };
   }
 
   trail(time, stage, o) {

@@ -1,9 +1,9 @@
 // The player: one clock (the audio), one camera, all figures.
 
 class Player {
-  constructor(data, positions, speech) {
+  constructor(data, positions, meshes, speech) {
     this.element = (id) => document.getElementById(id);
-    this.figures = data.figures.map((figure, index) => new Figure(figure, positions[index], index));
+    this.figures = data.figures.map((figure, index) => new Figure(figure, positions[index], index, meshes[figure.mesh]));
     this.words = data.words;
     this.lanes = data.lanes;
     this.speech = speech;
@@ -29,6 +29,7 @@ class Player {
     new ResizeObserver(() => { this.stale = true; this.wake(); }).observe(this.element("stage"));
     new ResizeObserver(() => this.wake()).observe(this.element("panel"));
     this.stale = true;
+    this.pictures = 0;
     this.clock = performance.now();
     this.ready = new Promise((done) => { this.opened = done; });
     this.wake();
@@ -141,13 +142,14 @@ class Player {
       band.figures = band.members.map((index, k) => {
         const figure = this.figures[index];
         figure.update(this.now, this.camera.yaw, band.slots[k], theme, this.trails);
-        return { capsules: figure.capsules, count: figure.count, shapes: figure.shapeList.length, thick: figure.thick, shaders: figure.shaders };
+        return figure.drawn;
       });
     }
     const ratio = Math.min(window.devicePixelRatio || 1, 2), moving = this.renderer.scale;
     if (still) this.renderer.scale = this.renderer.software && ratio < 2 ? 2 : 1;
     this.renderer.render({ bands: this.bands, width, height, ratio, theme, yaw: this.camera.yaw, overlay: this.overlay, still });
     this.renderer.scale = moving;
+    this.pictures += 1;
     this.placeLabels(width, height);
     this.timeline.draw();
     this.showClock();
@@ -301,12 +303,12 @@ class Player {
 }
 
 async function open(data) {
-  const unpacked = Promise.all(data.figures.map(unpackPositions));
+  const unpacked = Promise.all(data.figures.map(unpackPositions)), meshes = Promise.all(data.meshes.map(unpackMesh));
   const speech = await unpackSpeech(data.audio).catch((error) => {
     console.warn("This browser cannot decode the speech; the figures move without it:", error.message);
     return null;
   });
-  return new Player(data, await unpacked, speech);
+  return new Player(data, await unpacked, await meshes, speech);
 }
 
 let player = null;
@@ -327,6 +329,18 @@ window.a2gPlayer = {
   solo: (index) => player.solo(index),
   view: (change) => player.view(change),
   playing: () => player.playing,
+  vertices: (index = 0) => Array.from(player.figures[index].mesh.places),
+  // Draws moving pictures from a second on, 25 of a second, each complete before the next.
+  moving: (from, count) => {
+    const { gl } = player.renderer, pixel = new Uint8Array(4);
+    for (let i = 0; i < count; i++) {
+      player.now = from + 0.04 * i;
+      player.draw(performance.now(), false);
+      if (gl) gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    }
+  },
+  pictures: () => player.pictures,
+  scale: () => player.renderer.scale,
   speech: () => player.speech,
   // The tooltip of a position in the detailed timeline, in CSS pixels from its corner; lanes from top to bottom.
   tell: (x, y) => player.timeline.tell(x, y) || null,

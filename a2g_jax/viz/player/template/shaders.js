@@ -1,4 +1,5 @@
-// GLSL. Every body part is one instance of a round cone: a tube between two spheres that touches both smoothly.
+// GLSL. Every body part is one instance of a round cone, a tube between two spheres that touches both smoothly; or places
+// and normals are given (`soup.js`). Each shader exists in both kinds.
 
 const CAPSULE = `#version 300 es
 precision highp float;
@@ -7,7 +8,7 @@ layout(location = 1) in vec4 start;  // centre, radius
 layout(location = 2) in vec4 end;
 layout(location = 3) in vec4 axis;   // direction of flattening, thickness
 layout(location = 4) in vec4 colour; // linear light, gloss (below 0: not lit)
-void capsule(out vec3 place, out vec3 normal) {
+void surface(out vec3 place, out vec3 normal) {
   vec3 along = end.xyz - start.xyz;
   float size = length(along);
   vec3 z = size > 1e-5 ? along / size : vec3(0.0, 1.0, 0.0);
@@ -23,6 +24,15 @@ void capsule(out vec3 place, out vec3 normal) {
   place = mix(start.xyz, end.xyz, mesh.x) + radius * (x * n.x + y * (n.y * axis.w) + z * n.z);
   normal = normalize(x * n.x + y * (n.y / axis.w) + z * n.z);
 }
+`;
+
+const GIVEN = `#version 300 es
+precision highp float;
+layout(location = 0) in vec3 given;
+layout(location = 1) in vec3 facing;
+layout(location = 2) in float open;  // share of the sky's light
+layout(location = 4) in vec4 colour;
+void surface(out vec3 place, out vec3 normal) { place = given; normal = facing; }
 `;
 
 // Light of the sky that reaches a place, with capsules of the body in the way.
@@ -45,8 +55,7 @@ float occlusion(vec3 place, vec3 n, int part) {
 }
 `;
 
-// For software renderers (`coarse`) the occlusion is found at vertices, not at pixels, and the shadow has no soft edge.
-const bodyVertex = (coarse) => CAPSULE + (coarse ? OCCLUSION : "") + `
+const bodyVertex = (given) => (given ? GIVEN : CAPSULE) + `
 uniform mat4 camera, light;
 uniform int first;
 out vec3 place, normal, lit;
@@ -54,16 +63,17 @@ flat out vec4 paint;
 flat out int part;
 out float sky;
 void main() {
-  capsule(place, normal);
+  surface(place, normal);
   paint = colour;
   part = first + gl_InstanceID;
-  sky = ${coarse ? "occlusion(place, normal, part)" : "1.0"};
+  sky = ${given ? "open" : "1.0"};
   vec4 seen = light * vec4(place + normal * 0.008, 1.0);
   lit = seen.xyz * 0.5 + 0.5;
   gl_Position = camera * vec4(place, 1.0);
 }`;
 
-const bodyFragment = (coarse) => `#version 300 es
+// Of cones, the occlusion is found at every pixel. With one tap the shadow has no soft edge.
+const bodyFragment = (given, taps) => `#version 300 es
 precision highp float;
 precision highp sampler2DShadow;
 uniform sampler2DShadow depths;
@@ -74,10 +84,10 @@ flat in vec4 paint;
 flat in int part;
 in float sky;
 out vec4 result;
-${coarse ? "" : OCCLUSION}void main() {
+${given ? "" : OCCLUSION}void main() {
   vec3 n = normalize(normal), v = normalize(eye - place);
   if (paint.a < 0.0) { result = vec4(pow(paint.rgb, vec3(1.0 / 2.2)), alpha); return; }
-  float open = ${coarse ? "sky" : "occlusion(place, n, part)"};
+  float open = ${given ? "sky" : "occlusion(place, n, part)"};
   // The ground hides the lower half of the sky from what is close to it.
   float low = clamp((place.y - floorHeight) / 0.35, 0.0, 1.0);
   open *= mix(mix(0.45, 1.0, low), 1.0, clamp(n.y * 0.5 + 0.5, 0.0, 1.0));
@@ -85,9 +95,9 @@ ${coarse ? "" : OCCLUSION}void main() {
   float sunlight = 0.0;
   if (face > 0.0) {
     float bias = -0.0012;
-    for (int i = 0; i < ${coarse ? 1 : 4}; i++) {
-      vec2 o = ${coarse ? "vec2(0.0)" : "vec2(i < 2 ? -0.9 : 0.9, (i & 1) == 0 ? -0.9 : 0.9)"};
-      sunlight += ${coarse ? "1.0" : "0.25"} * texture(depths, vec3(lit.xy + o * texel, lit.z + bias));
+    for (int i = 0; i < ${taps}; i++) {
+      vec2 o = ${taps === 1 ? "vec2(0.0)" : "vec2(i < 2 ? -0.9 : 0.9, (i & 1) == 0 ? -0.9 : 0.9)"};
+      sunlight += ${(1 / taps).toFixed(2)} * texture(depths, vec3(lit.xy + o * texel, lit.z + bias));
     }
     sunlight *= face;
   }
@@ -100,11 +110,11 @@ ${coarse ? "" : OCCLUSION}void main() {
   result = vec4(pow(light, vec3(1.0 / 2.2)), alpha);
 }`;
 
-const DEPTH_VERTEX = CAPSULE + `
+const depthVertex = (given) => (given ? GIVEN : CAPSULE) + `
 uniform mat4 light;
 void main() {
   vec3 place, normal;
-  capsule(place, normal);
+  surface(place, normal);
   gl_Position = light * vec4(place, 1.0);
 }`;
 
@@ -115,14 +125,14 @@ void main() { result = vec4(1.0); }`;
 
 // Shadows on the ground, drawn flat into a map of it. Red: cast by what is low, sharp later; blue: by what is high,
 // blurred more; green: closeness of bodies above, for the soft darkening at the feet.
-const SPOT_VERTEX = CAPSULE + `
+const spotVertex = (given) => (given ? GIVEN : CAPSULE) + `
 uniform vec4 area;  // centre x, z and half size
 uniform vec3 sun;
 uniform float above;
 out float high;
 void main() {
   vec3 place, normal;
-  capsule(place, normal);
+  surface(place, normal);
   high = max(place.y, 0.0);
   vec2 spot = above > 0.5 ? place.xz : place.xz - sun.xz * (place.y / sun.y);
   gl_Position = vec4((spot - area.xy) / area.zw, 0.0, 1.0);

@@ -6,10 +6,14 @@ function bytesOf(text) {
   return bytes;
 }
 
+async function inflate(text) {
+  const packed = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Response(packed).arrayBuffer();
+}
+
 // Positions in metres, frame after frame, from compressed second differences of each coordinate over time.
 async function unpackPositions(figure) {
-  const packed = new Blob([bytesOf(figure.data)]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const parts = new Uint8Array(await new Response(packed).arrayBuffer());
+  const parts = new Uint8Array(await inflate(figure.data));
   const columns = 3 * figure.points, { frames } = figure, half = columns * frames, out = new Float32Array(half);
   for (let column = 0; column < columns; column++) {
     const low = figure.low[column % 3], step = figure.step[column % 3];
@@ -22,6 +26,23 @@ async function unpackPositions(figure) {
     }
   }
   return out;
+}
+
+// A skinned mesh: vertices where they are bound, their bones and weights, colours with a gloss, and triangles.
+async function unpackMesh(mesh, id) {
+  const buffer = await inflate(mesh.data), { vertices, triangles } = mesh;
+  let at = 0;
+  const take = (Kind, count) => { const part = new Kind(buffer, at, count); at += part.byteLength; return part; };
+  const codes = take(Uint16Array, 3 * vertices), bones = take(Uint16Array, 4 * vertices), corners = take(Uint16Array, 3 * triangles);
+  const normals = Float32Array.from(take(Int8Array, 3 * vertices), (x) => x / 127), shades = take(Uint8Array, 3 * vertices), shares = take(Uint8Array, 4 * vertices);
+  const places = Float32Array.from(codes, (code, i) => mesh.low[i % 3] + mesh.step[i % 3] * code), weights = new Float32Array(4 * vertices), colours = new Float32Array(4 * vertices);
+  for (let i = 0; i < vertices; i++) {
+    const total = shares[4 * i] + shares[4 * i + 1] + shares[4 * i + 2] + shares[4 * i + 3];
+    for (let k = 0; k < 4; k++) weights[4 * i + k] = shares[4 * i + k] / total;
+    for (let k = 0; k < 3; k++) colours[4 * i + k] = Math.pow(shades[3 * i + k] / 255, 2.2);
+    colours[4 * i + 3] = 0.12;
+  }
+  return { id, count: vertices, bind: places, facing: normals, bones, weights, colours, indices: corners, open: mesh.open, centres: mesh.centres };
 }
 
 // 16-bit samples of the speech, and a WAV file of them, which any browser seeks in exactly; null without speech.
