@@ -15,19 +15,23 @@ from pathlib import Path
 from typing import Any
 
 RESULTS = Path(__file__).parent / "results"
-THREADS = 2
 #: Last line of a contender's output: its figures, after this mark.
 _MARK = "FIGURES "
 
 
-def limit_threads() -> None:
-    """Two threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def limit_threads(threads: int) -> None:
+    """As many threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ[name] = str(THREADS)
+        os.environ[name] = str(threads)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if hasattr(os, "sched_setaffinity"):
         # XLA uses as many threads as the process has cores.
-        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
+        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:threads])
 
 
 def _busy_seconds() -> float:
@@ -108,42 +112,18 @@ def run_alone(module: str, contender: str, arguments: list[str]) -> dict[str, An
     return json.loads(lines[-1].removeprefix(_MARK))
 
 
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.3f}" if abs(value) < 100 else f"{value:.0f}"
-    return "-" if value is None else str(value)
-
-
-def print_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> None:
-    """Rows as a Markdown table; ``columns`` maps keys to headings."""
-    print("| " + " | ".join(columns.values()) + " |")
-    print("|" + " --- |" * len(columns))
-    for row in rows:
-        print("| " + " | ".join(_cell(row.get(key)) for key in columns) + " |")
-        if "failed" in row:
-            print(f"\n{row['contender']} failed: {row['failed']}\n")
-
-
-def write_results(name: str, settings: dict[str, Any], rows: list[dict[str, Any]], out: Path | None) -> Path:
-    """JSON with everything needed to repeat the measurement."""
+def environment() -> dict[str, Any]:
+    """Date, machine and versions: what else is needed to repeat a measurement."""
     versions = {}
     for package in ("a2g_jax", "jax", "jaxlib", "flax", "optax", "numpy", "torch"):
         try:
             versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
             versions[package] = None
-    path = out or RESULTS / f"{name}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    values = {
-        "command": " ".join(["python -m", f"experiments.benchmarks.{name}", *sys.argv[1:]]),
+    return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),
-        "threads": THREADS,
         "versions": versions,
-        "settings": settings,
-        "rows": rows,
     }
-    path.write_text(json.dumps(values, indent=1) + "\n")
-    return path
