@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case
 
 
@@ -22,12 +23,9 @@ def case(seconds: float, seed: int = 0) -> Case:
         return lambda: log_mel(audio, config, FPS, frames)
 
     def theirs() -> Call:
-        import torch
-
+        torch = load_torch()
         from a2g_jax.features.mel_filters import mel_filters
-        from experiments.benchmarks.measure import usable_cores
 
-        torch.set_num_threads(usable_cores())
         high = config.sample_rate / 2
         filters = torch.from_numpy(
             np.asarray(mel_filters(config.sample_rate, config.window, config.bands, config.low_hz, high), np.float32)

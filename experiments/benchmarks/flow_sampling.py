@@ -8,6 +8,7 @@ the matrices once. The floor reads the weights once a frame, and computes their 
 from collections.abc import Callable
 from typing import Any
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case
 
 
@@ -65,13 +66,10 @@ def _ours(networks: Any, params: Any) -> Callable[..., Any]:
 
 
 def _twin(case: Any, params: Any, precompute: bool) -> Callable[..., Any]:
-    import torch
-
-    from experiments.benchmarks.measure import usable_cores
+    torch = load_torch()
     from experiments.benchmarks.torch_flow import Twin
     from experiments.benchmarks.torch_flow_weights import load_params
 
-    torch.set_num_threads(usable_cores())
     twin = Twin(case.config, case.channels, case.bands).eval()
     load_params(twin, params)
     return lambda z, audio: twin.sample(torch.from_numpy(z), torch.from_numpy(audio), precompute).numpy()

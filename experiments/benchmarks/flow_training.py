@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case, product_flop
 
 
@@ -69,16 +70,14 @@ def _ours(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: in
 
 
 def _twin(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: int) -> Call:
+    torch = load_torch()
     import jax
-    import torch
     from torch.nn import utils
 
     from a2g_jax.models.stylized_flow.networks import FlowNetworks
-    from experiments.benchmarks.measure import usable_cores
     from experiments.benchmarks.torch_flow import Twin
     from experiments.benchmarks.torch_flow_weights import load_params
 
-    torch.set_num_threads(usable_cores())
     torch.manual_seed(seed)
     twin = Twin(config, case.channels, case.bands)
     networks = FlowNetworks(config, case.data)

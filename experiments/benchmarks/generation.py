@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case, product_flop
 
 #: Rows of the table of latent statistics that samples draw from.
@@ -73,21 +74,18 @@ def _ours(config: Any, features: Any, samples: int, seed: int) -> Call:
 
 
 def _theirs(config: Any, features: Any, samples: int, seed: int, compiled: bool) -> Call:
-    import torch
-
-    from experiments.benchmarks.measure import usable_cores
+    torch = load_torch()
     from experiments.benchmarks.torch_twin import Gaussian, Twin
 
-    torch.set_num_threads(usable_cores())
     torch.manual_seed(seed)
     twin = Twin(config.model_config, config.skeleton, config.mel.width).eval()
     audio, code = torch.from_numpy(features), config.model_config.code_channels
     means, stds = torch.randn(_CLIPS, code), torch.rand(_CLIPS, code) + 0.5
 
-    def encode(audio: torch.Tensor) -> Any:
+    def encode(audio: Any) -> Any:
         return twin.audio_encoder(audio[None].transpose(1, 2))
 
-    def decode(mean: torch.Tensor, log_variance: torch.Tensor, row: torch.Tensor, noise: torch.Tensor) -> Any:
+    def decode(mean: Any, log_variance: Any, row: Any, noise: Any) -> Any:
         around = means[row][:, :, None], stds[row][:, :, None]
         return twin.positions(twin.generate(Gaussian(mean, log_variance), *around, tuple(noise)))
 

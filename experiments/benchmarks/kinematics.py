@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case
 
 _FRAMES = 4096
@@ -43,13 +44,10 @@ def _ours(skeleton: Any, pose: Any, upstream: Any) -> Call:
 
 
 def _theirs(skeleton: Any, pose: Any, upstream: Any, compiled: bool) -> Call:
-    import torch
-
+    torch = load_torch()
     from a2g_jax.models.audio2gestures.config import PRESETS
-    from experiments.benchmarks.measure import usable_cores
     from experiments.benchmarks.torch_twin import Twin, matrix_from_6d
 
-    torch.set_num_threads(usable_cores())
     twin = Twin(PRESETS["paper"], skeleton, 1)
     values, gradient = torch.from_numpy(pose).requires_grad_(True), torch.from_numpy(upstream)
     places = lambda values: twin.positions(matrix_from_6d(values))  # noqa: E731

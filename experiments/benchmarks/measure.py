@@ -24,6 +24,17 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def load_torch() -> Any:
+    """PyTorch with as many threads as this process may use cores; its import would give the process all of them."""
+    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
+    import torch
+
+    if cores is not None:
+        os.sched_setaffinity(0, cores)
+    torch.set_num_threads(usable_cores())
+    return torch
+
+
 def limit_threads(threads: int) -> None:
     """As many threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case, product_flop
 
 #: Rows of the corpus, 5.5 minutes: enough that gathering clips is not one contiguous copy.
@@ -81,14 +82,11 @@ def _ours(config: Any, corpus: Any, arrays: dict[str, Any]) -> Call:
 
 
 def _theirs(config: Any, corpus: Any, arrays: dict[str, Any], kind: str) -> Call:
-    import torch
-
-    from experiments.benchmarks.measure import usable_cores
+    torch = load_torch()
     from experiments.benchmarks.torch_authors import AuthorsTwin
     from experiments.benchmarks.torch_twin import Noise, Twin
     from experiments.benchmarks.workload import make_skeleton
 
-    torch.set_num_threads(usable_cores())
     torch.manual_seed(config.train_config.seed)
     settings, training = config.model_config, config.train_config
     if kind == "authors":
