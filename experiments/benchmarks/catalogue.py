@@ -91,6 +91,6 @@ BENCHMARKS: dict[str, Benchmark] = {
     "import": Benchmark("import", "commands", rounds=3),
     "demo": Benchmark("a2g demo", "commands", rounds=2),
     "generate": Benchmark("a2g generate demo-flow, 3 s of speech", "commands", rounds=2),
-    "preparation": Benchmark("a2g prepare, 4 minutes of BVH", "commands", rounds=1),
-    "evaluation": Benchmark("a2g evaluate, 3 samples", "commands", rounds=1),
+    "prepare": Benchmark("a2g prepare, 4 minutes of BVH", "commands", rounds=1),
+    "evaluate": Benchmark("a2g evaluate, 3 samples", "commands", rounds=1),
 }  # fmt: skip

@@ -40,10 +40,10 @@ def commands(name: str) -> dict[str, Command]:
             "a2g_jax without cache": Command([*a2g, "demo"], removed="demo cache"),
         },
         "generate": {"a2g_jax": Command([*a2g, "generate", "demo-flow", *_SPEECH, "--formats", "npz"], _write_speech)},
-        "preparation": {
+        "prepare": {
             "a2g_jax": Command([*a2g, "prepare", "folder", "source", "--out", "corpus"], _write_takes, "corpus"),
         },
-        "evaluation": {
+        "evaluate": {
             "a2g_jax": Command(
                 [*a2g, "evaluate", "demo", "--corpus", "corpus", "--samples", "3", "--out", "report"],
                 _write_corpus,

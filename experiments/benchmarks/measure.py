@@ -123,6 +123,22 @@ def run_alone(module: str, contender: str, arguments: list[str]) -> dict[str, An
     return json.loads(lines[-1].removeprefix(_MARK))
 
 
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3f}" if abs(value) < 100 else f"{value:.0f}"
+    return "-" if value is None else str(value)
+
+
+def print_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    """Rows as a Markdown table; ``columns`` maps keys to headings."""
+    print("| " + " | ".join(columns.values()) + " |")
+    print("|" + " --- |" * len(columns))
+    for row in rows:
+        print("| " + " | ".join(_cell(row.get(key)) for key in columns) + " |")
+        if "failed" in row:
+            print(f"\n{row['contender']} failed: {row['failed']}\n")
+
+
 def environment() -> dict[str, Any]:
     """Date, machine and versions: what else is needed to repeat a measurement."""
     versions = {}
@@ -138,3 +154,13 @@ def environment() -> dict[str, Any]:
         "cores": os.cpu_count(),
         "versions": versions,
     }
+
+
+def write_results(name: str, settings: dict[str, Any], rows: list[dict[str, Any]], out: Path | None) -> Path:
+    """JSON with everything needed to repeat the measurement."""
+    path = out or RESULTS / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    command = " ".join(["python -m", f"experiments.benchmarks.{name}", *sys.argv[1:]])
+    values = {"command": command, **environment(), "settings": settings, "rows": rows}
+    path.write_text(json.dumps(values, indent=1) + "\n")
+    return path
