@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +20,15 @@ RESULTS = Path(__file__).parent / "results"
 _MARK = "FIGURES "
 
 
+#: Environment variable with the cores that a benchmark keeps to.
+_CORES = "A2G_BENCHMARK_CORES"
+
+
 def usable_cores() -> int:
     """Cores that this process may use."""
+    if _CORES in os.environ:
+        return len(os.environ[_CORES].split(","))
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def load_torch() -> Any:
-    """PyTorch with as many threads as this process may use cores; its import would give the process all of them."""
-    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
-    import torch
-
-    if cores is not None:
-        os.sched_setaffinity(0, cores)
-    torch.set_num_threads(usable_cores())
-    return torch
 
 
 def limit_threads(threads: int) -> None:
@@ -42,7 +38,28 @@ def limit_threads(threads: int) -> None:
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if hasattr(os, "sched_setaffinity"):
         # XLA uses as many threads as the process has cores.
-        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:threads])
+        os.environ[_CORES] = ",".join(map(str, sorted(os.sched_getaffinity(0))[:threads]))
+        keep_to_cores()
+
+
+def keep_to_cores() -> None:
+    """Put all threads of this process on the cores of :func:`limit_threads` again, which libraries may undo."""
+    tasks = Path("/proc/self/task")
+    if _CORES not in os.environ:
+        return
+    cores = {int(core) for core in os.environ[_CORES].split(",")}
+    for task in tasks.iterdir() if tasks.exists() else ():
+        with suppress(ProcessLookupError):
+            os.sched_setaffinity(int(task.name), cores)
+
+
+def load_torch() -> Any:
+    """PyTorch with as many threads as this process may use cores; its import may give the process all of them."""
+    import torch
+
+    keep_to_cores()
+    torch.set_num_threads(usable_cores())
+    return torch
 
 
 def _busy_seconds() -> float:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from experiments.benchmarks.measure import Stopwatch, peak_megabytes, usable_cores
+from experiments.benchmarks.measure import Stopwatch, keep_to_cores, peak_megabytes, usable_cores
 
 #: A call that waits for its results.
 Call = Callable[[], Any]
@@ -148,6 +148,7 @@ def _flop(program: Any) -> float:
 
 
 def _turn(call: Call) -> dict[str, Any]:
+    keep_to_cores()
     watch, wall, used = Stopwatch(), time.perf_counter(), time.process_time()
     call()
     took = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - used}
