@@ -62,9 +62,8 @@ def load_torch() -> Any:
     return torch
 
 
-def _busy_seconds() -> float:
-    """CPU seconds that all processes together have used since boot, on the cores this process may use."""
-    cores = {f"cpu{core}" for core in os.sched_getaffinity(0)}
+def _busy_seconds(cores: set[str]) -> float:
+    """CPU seconds that all processes together have used since boot on some cores."""
     total = 0
     for line in Path("/proc/stat").read_text().splitlines():
         name, *ticks = line.split()
@@ -80,15 +79,17 @@ class Stopwatch:
     def __init__(self) -> None:
         self._linux = Path("/proc/stat").exists()
         self._wall, self._own = time.perf_counter(), time.process_time()
-        self._busy = _busy_seconds() if self._linux else 0.0
+        # The same ones at the end: libraries may put the process on others.
+        self._cores = {f"cpu{core}" for core in os.sched_getaffinity(0)} if self._linux else set()
+        self._busy = _busy_seconds(self._cores) if self._linux else 0.0
 
     def others(self) -> float | None:
         """Between 0 and 1."""
         if not self._linux:
             return None
         wall, own = time.perf_counter() - self._wall, time.process_time() - self._own
-        busy = _busy_seconds() - self._busy
-        return max(0.0, busy - own) / (wall * len(os.sched_getaffinity(0)))
+        busy = _busy_seconds(self._cores) - self._busy
+        return max(0.0, busy - own) / (wall * len(self._cores))
 
 
 def measure(call: Callable[[], Any], repeats: int, warm_up: int = 2) -> dict[str, Any]:
