@@ -18,8 +18,11 @@ from a2g_jax.training.run import Run
 
 Rows = Float[np.ndarray, "T R D"]
 
-#: Frames that one call of a compiled function gives. One size for every audio: a new length does not compile again.
+#: Frames that one call of a compiled function gives at most; speech of more frames is made in windows of so many.
 WINDOW = 1024
+#: Smallest window. Speech that fits gets the smallest window of this times a power of two: few sizes, since each of
+#: them compiles, and at most twice the frames that are needed.
+_LEAST = 2 * BLOCK
 #: Samples that an autoregressive model generates side by side: one reading of its weights serves all of them. Always as
 #: many, also for a single one, so that a sample does not depend on how many are requested.
 LANES = 4
@@ -49,7 +52,7 @@ class Engine:
     def __init__(self, run: Run, window: int = WINDOW) -> None:
         """
         Args:
-            window: frames of one call of a compiled function, a multiple of 128.
+            window: frames of one call of a compiled function at most, a multiple of 128.
 
         Raises:
             InputError: the run's model does not generate motion from audio.
@@ -73,7 +76,7 @@ class Engine:
         """Poses (window, R, D) of a window of a model that is not autoregressive."""
         assert self.model.sample is not None
         pose = self.model.sample(params, summary, key, condition, start)
-        return self.run.config.space.valid(jax.lax.dynamic_slice_in_dim(pose, self.halo, self.window))
+        return self.run.config.space.valid(jax.lax.dynamic_slice_in_dim(pose, self.halo, len(pose) - 2 * self.halo))
 
     def begin(self, params, summary, keys, seed_poses) -> Any:
         """States of an autoregressive model before the first frame, one for each of :data:`LANES` keys."""
@@ -83,7 +86,8 @@ class Engine:
     def advance(self, params, summary, keys, condition, start, state) -> tuple[Any, Any]:
         """Poses (lanes, window, R, D) of a window of an autoregressive model, and the states after it."""
         assert self.model.proceed is not None
-        rows = self.window + self.model.overlap
+        # All parts of the condition of an autoregressive model have a row for each frame.
+        rows = len(jax.tree.leaves(condition)[0]) - 2 * self.halo + self.model.overlap
         cut = jax.tree.map(lambda array: jax.lax.dynamic_slice_in_dim(array, self.halo, rows), condition)
         lanes = jax.vmap(self.model.proceed, in_axes=(None, None, 0, None, None, 0))
         pose, state = lanes(params, summary, keys, cut, start + self.halo, state)
@@ -164,9 +168,17 @@ class Engine:
         for start, cut in self.cuts(given):
             yield start, self._condition(self._params, self._summary, cut)
 
+    def window_of(self, frames: int) -> int:
+        """Frames of the windows in which speech of so many frames is made: the smallest size that holds all of them, or
+        the largest; the largest alone for models whose last bits depend on it."""
+        size = self.window if self.model.fixed_window else _LEAST
+        while size < min(frames, self.window):
+            size *= 2
+        return min(size, self.window)
+
     def cuts(self, given: Condition) -> Iterator[tuple[int, Condition]]:
         """First frame (context included) and condition of each window."""
-        frames, halo, window = len(given.audio), self.halo, self.window
+        frames, halo, window = len(given.audio), self.halo, self.window_of(len(given.audio))
         count = -(-frames // window)
         around = (halo, count * window - frames + halo)
         # The quietest value is what silence looks like after the features' floor.

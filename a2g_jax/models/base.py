@@ -209,6 +209,9 @@ class Model(NamedTuple):
     """Frames of audio after its own that a frame of an autoregressive model depends on."""
     overlap: int = 0
     """Frames after the T that ``proceed`` returns of which it also needs the condition."""
+    fixed_window: bool = False
+    """Whether a shorter window gives other last bits of the same frames, so that the engine has to use one length for
+    speech of any length."""
     controls: Controls | None = None
 
     reconstruct: Callable[..., Array] | None = None

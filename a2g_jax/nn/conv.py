@@ -9,6 +9,8 @@ from jax import lax
 from jax.nn.initializers import Initializer
 from jaxtyping import Array, Float
 
+from a2g_jax.nn.linear import linear
+
 _DIMENSIONS = ("NWC", "WIO", "NWC")
 
 
@@ -88,4 +90,4 @@ class Dense(nn.Module):
     def __call__(self, x: Float[Array, "B T C"]) -> Float[Array, "B T D"]:
         kernel = self.param("kernel", nn.initializers.xavier_uniform(), (x.shape[-1], self.features))
         bias = self.param("bias", nn.initializers.constant(self.initial_bias), (self.features,))
-        return x @ kernel + bias[None, None]
+        return linear(x, kernel) + bias[None, None]

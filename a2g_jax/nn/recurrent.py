@@ -12,6 +12,8 @@ import jax.numpy as jnp
 from flax import linen as nn
 from jaxtyping import Array, Float
 
+from a2g_jax.nn.linear import linear
+
 State = Float[Array, "B H"]
 
 
@@ -154,7 +156,7 @@ class _Recurrent(nn.Module):
 
     def _project(self, x, kernel, bias):
         """Time first, in the order of reading."""
-        frames = jnp.swapaxes(x @ kernel + bias[None, None], 0, 1)
+        frames = jnp.swapaxes(linear(x, kernel) + bias[None, None], 0, 1)
         return frames[::-1] if self.reverse else frames
 
     def _ordered(self, states):

@@ -11,28 +11,59 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 RESULTS = Path(__file__).parent / "results"
-THREADS = 2
 #: Last line of a contender's output: its figures, after this mark.
 _MARK = "FIGURES "
 
 
-def limit_threads() -> None:
-    """Two threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
+#: Environment variable with the cores that a benchmark keeps to.
+_CORES = "A2G_BENCHMARK_CORES"
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    if _CORES in os.environ:
+        return len(os.environ[_CORES].split(","))
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def limit_threads(threads: int) -> None:
+    """As many threads for whichever library is imported next; call it before importing JAX, NumPy or PyTorch."""
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ[name] = str(THREADS)
+        os.environ[name] = str(threads)
     os.environ.setdefault("JAX_PLATFORMS", "cpu")
     if hasattr(os, "sched_setaffinity"):
         # XLA uses as many threads as the process has cores.
-        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
+        os.environ[_CORES] = ",".join(map(str, sorted(os.sched_getaffinity(0))[:threads]))
+        keep_to_cores()
 
 
-def _busy_seconds() -> float:
-    """CPU seconds that all processes together have used since boot, on the cores this process may use."""
-    cores = {f"cpu{core}" for core in os.sched_getaffinity(0)}
+def keep_to_cores() -> None:
+    """Put all threads of this process on the cores of :func:`limit_threads` again, which libraries may undo."""
+    tasks = Path("/proc/self/task")
+    if _CORES not in os.environ:
+        return
+    cores = {int(core) for core in os.environ[_CORES].split(",")}
+    for task in tasks.iterdir() if tasks.exists() else ():
+        with suppress(ProcessLookupError):
+            os.sched_setaffinity(int(task.name), cores)
+
+
+def load_torch() -> Any:
+    """PyTorch with as many threads as this process may use cores; its import may give the process all of them."""
+    import torch
+
+    keep_to_cores()
+    torch.set_num_threads(usable_cores())
+    return torch
+
+
+def _busy_seconds(cores: set[str]) -> float:
+    """CPU seconds that all processes together have used since boot on some cores."""
     total = 0
     for line in Path("/proc/stat").read_text().splitlines():
         name, *ticks = line.split()
@@ -48,15 +79,17 @@ class Stopwatch:
     def __init__(self) -> None:
         self._linux = Path("/proc/stat").exists()
         self._wall, self._own = time.perf_counter(), time.process_time()
-        self._busy = _busy_seconds() if self._linux else 0.0
+        # The same ones at the end: libraries may put the process on others.
+        self._cores = {f"cpu{core}" for core in os.sched_getaffinity(0)} if self._linux else set()
+        self._busy = _busy_seconds(self._cores) if self._linux else 0.0
 
     def others(self) -> float | None:
         """Between 0 and 1."""
         if not self._linux:
             return None
         wall, own = time.perf_counter() - self._wall, time.process_time() - self._own
-        busy = _busy_seconds() - self._busy
-        return max(0.0, busy - own) / (wall * len(os.sched_getaffinity(0)))
+        busy = _busy_seconds(self._cores) - self._busy
+        return max(0.0, busy - own) / (wall * len(self._cores))
 
 
 def measure(call: Callable[[], Any], repeats: int, warm_up: int = 2) -> dict[str, Any]:
@@ -124,26 +157,28 @@ def print_table(rows: list[dict[str, Any]], columns: dict[str, str]) -> None:
             print(f"\n{row['contender']} failed: {row['failed']}\n")
 
 
-def write_results(name: str, settings: dict[str, Any], rows: list[dict[str, Any]], out: Path | None) -> Path:
-    """JSON with everything needed to repeat the measurement."""
+def environment() -> dict[str, Any]:
+    """Date, machine and versions: what else is needed to repeat a measurement."""
     versions = {}
     for package in ("a2g_jax", "jax", "jaxlib", "flax", "optax", "numpy", "torch"):
         try:
             versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
             versions[package] = None
-    path = out or RESULTS / f"{name}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    values = {
-        "command": " ".join(["python -m", f"experiments.benchmarks.{name}", *sys.argv[1:]]),
+    return {
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
         "cores": os.cpu_count(),
-        "threads": THREADS,
         "versions": versions,
-        "settings": settings,
-        "rows": rows,
     }
+
+
+def write_results(name: str, settings: dict[str, Any], rows: list[dict[str, Any]], out: Path | None) -> Path:
+    """JSON with everything needed to repeat the measurement."""
+    path = out or RESULTS / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    command = " ".join(["python -m", f"experiments.benchmarks.{name}", *sys.argv[1:]])
+    values = {"command": command, **environment(), "settings": settings, "rows": rows}
     path.write_text(json.dumps(values, indent=1) + "\n")
     return path

@@ -191,18 +191,18 @@ class Twin(nn.Module):
         s_motion = self._in_time(motion_shared.shift(noise.motion))
         common = {"alignment": (s_audio - s_motion).abs().mean()}
         if self.config.latent != "dct":
-            common["kl_shared"] = _kl(audio_shared) + _kl(motion_shared)
+            common["kl_shared"] = kl(audio_shared) + kl(motion_shared)
         if motion_specific is None:
             made = self.rotations(self.decoder(torch.cat([s_motion, s_audio])))
             return common | self._motion_terms(pose, made)
         i_motion = self._in_time(motion_specific.shift(noise.specific))
 
-        i_random, kl_specific = noise.mapped, _kl(motion_specific)
+        i_random, kl_specific = noise.mapped, kl(motion_specific)
         if self.mapping_net is not None:
             mean = i_motion.detach().mean(2, keepdim=True)
             std = i_motion.detach().std(2, keepdim=True, correction=0)
             mapped = self.mapping_net(torch.cat([mean + std * noise.first, mean + std * noise.second]))
-            i_random, kl_specific = self._in_time(mapped.shift(noise.mapped)), kl_specific + _kl(mapped)
+            i_random, kl_specific = self._in_time(mapped.shift(noise.mapped)), kl_specific + kl(mapped)
 
         shared = torch.cat([s_motion, s_audio, s_audio, s_audio])
         specific = torch.cat([i_motion, i_motion, i_random])
@@ -219,9 +219,9 @@ class Twin(nn.Module):
             "kl_specific": kl_specific,
             "relaxed": torch.clamp(excess, min=0.0).mean(),
             "sampled_rotation": geodesic_distance(drawn, true_rotations).mean(),
-            "sampled_speed": _distance(sampled.diff(dim=1), target.diff(dim=1)),
+            "sampled_speed": distance(sampled.diff(dim=1), target.diff(dim=1)),
             "bicycle": (i_random[:clips].detach() - self._in_time(recovered.mean)).abs().mean(),
-            "diversity": -_distance(sampled, other),
+            "diversity": -distance(sampled, other),
         }
 
     def _motion_terms(self, pose: Tensor, rotations: Tensor) -> dict[str, Tensor]:
@@ -231,8 +231,8 @@ class Twin(nn.Module):
         twice = torch.cat([target, target])
         terms = {
             "rotation": geodesic_distance(rotations, torch.cat([true_rotations, true_rotations])).mean(),
-            "position": _distance(both, twice),
-            "speed": _distance(both.diff(dim=1), twice.diff(dim=1)),
+            "position": distance(both, twice),
+            "speed": distance(both.diff(dim=1), twice.diff(dim=1)),
         }
         if self.config.stft_weight > 0:
             terms["stft"] = stft_distance(both.flatten(2), twice.flatten(2))
@@ -300,11 +300,13 @@ class Twin(nn.Module):
         return self.rotations(self.decoder(shared.shift(noise[1]), code.shift(noise[2])))
 
 
-def _distance(first: Tensor, second: Tensor) -> Tensor:
+def distance(first: Tensor, second: Tensor) -> Tensor:
+    """Mean L1 distance of points (..., 3)."""
     return (first - second).abs().sum(-1).mean()
 
 
-def _kl(code: Gaussian) -> Tensor:
+def kl(code: Gaussian) -> Tensor:
+    """KL divergence from the standard normal, summed over channels, a frame's average."""
     return 0.5 * (code.log_variance.exp() + code.mean**2 - 1.0 - code.log_variance).sum(1).mean()
 
 

@@ -62,6 +62,15 @@ def test_windows_leave_no_seam(generator):
     np.testing.assert_allclose(windowed.rotations, whole.rotations, atol=1e-5)
 
 
+def test_short_speech_is_made_in_a_short_window(generator):
+    engine = Generator(generator.run).engine
+    assert [engine.window_of(frames) for frames in (1, 90, 256, 257, 1024, 5000)] == [256, 256, 256, 512, 1024, 1024]
+    assert generator.engine.window_of(5000) == generator.engine.window_of(1) == 128
+    fixed = Generator(generator.run).engine
+    fixed.model = fixed.model._replace(fixed_window=True)
+    assert fixed.window_of(1) == 1024
+
+
 def test_no_new_length_compiles_again(generator):
     generator.generate(_SPEECH, 1)
     compiled = generator.engine._sample._cache_size()

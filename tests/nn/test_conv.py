@@ -9,6 +9,7 @@ from jax.test_util import check_grads
 from scipy.ndimage import convolve1d
 
 from a2g_jax.nn.conv import Conv1D, Dense, conv1d
+from a2g_jax.nn.linear import linear
 
 CASES = [(1, 1), (3, 1), (3, 4), (5, 2), (3, 9)]
 
@@ -61,6 +62,21 @@ def test_gradient_equals_xlas(taps, dilation, narrowing):
 def test_gradient_numerically(x64):
     x, kernel = (jnp.asarray(array, jnp.float64) for array in data(3, frames=6))
     check_grads(jax.jit(lambda a, b: jnp.tanh(conv1d(a, b, 2))), (x, kernel), order=1, modes=["rev"])
+
+
+@pytest.mark.parametrize("axes", [(5,), (2, 5), (3, 2, 5)])
+def test_gradient_of_linear_equals_xlas(axes):
+    random = np.random.default_rng(2)
+    sizes = (*axes, 3), (3, 4), (*axes, 4)
+    x, kernel, dy = (jnp.asarray(random.normal(size=size), jnp.float32) for size in sizes)
+
+    def both(x, kernel):
+        return [jax.vjp(f, x, kernel)[1](dy) for f in (linear, jnp.matmul)]
+
+    ours, theirs = jax.jit(both)(x, kernel)
+    for mine, expected in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(mine, expected, atol=1e-5)
+    np.testing.assert_array_equal(linear(x, kernel), jnp.matmul(x, kernel))
 
 
 def test_gradient_inside_scan_is_the_one_outside():

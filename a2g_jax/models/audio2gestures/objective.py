@@ -115,6 +115,9 @@ def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     in_time = lambda steps: shifted(codec.specific_to_frames(steps), shifts)  # noqa: E731
     i_motion = in_time(steps_motion)
     steps_random, mapped = _random_codes(codec, params, keys[3:6], steps_motion)
+    if config.diversity_reference == "transfer":
+        # Nothing compares two samples: the second is not decoded.
+        steps_random = steps_random[:1]
     draws = len(steps_random)
 
     # One large call decodes all motions: reconstruction, audio to motion, and the random samples.
@@ -186,7 +189,7 @@ def _sampled_terms(
 
     Args:
         turns: rotations of the truth, of both reconstructions, and of the samples; None for poses without rotations.
-        sampled: positions of two samples.
+        sampled: positions of two samples, or of one where samples are to differ from the transferred motion.
         transferred: positions of g(S_A, I_M).
     """
     config, reduce, scale = codec.config, codec.reductions, _scales(codec, target, turns)

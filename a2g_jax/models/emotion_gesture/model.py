@@ -152,6 +152,8 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         seed_frames=config.seed_frames,
         lookahead=config.stride - 1,
         overlap=config.stride - 1,
+        # All chunks of a window are encoded together, and how XLA adds up products depends on their number.
+        fixed_window=True,
         controls=controls,
         reconstruct=reconstruct,
     )

@@ -266,15 +266,16 @@ class FlowNetworks:
         self, params: Params, x: Float[Array, "B N C"], given: Conditioning
     ) -> tuple[Float[Array, "B N C"], Float[Array, "B N"]]:
         """Latents and log-determinants of poses."""
+        again = self.config.recompute
         if not self.config.predictor:
-            return glow(params["glow"], self.shape, x, given.history, given.context)
+            return glow(params["glow"], self.shape, x, given.history, given.context, again)
         errors = predictor(params["predictor"], x, given.poses)
-        z, log_det = glow(params["glow"], self.shape, errors, given.history, given.context)
+        z, log_det = glow(params["glow"], self.shape, errors, given.history, given.context, again)
         return z, log_det + predictor_log_det(params["predictor"])
 
     def motion(self, params: Params, z: Float[Array, "B N C"], given: Conditioning) -> Float[Array, "B N C"]:
         """Poses of latents, all at once, given the poses before them."""
-        x = glow_inverse(params["glow"], self.shape, z, given.history, given.context)
+        x = glow_inverse(params["glow"], self.shape, z, given.history, given.context, self.config.recompute)
         if not self.config.predictor:
             return x
         return predictor_inverse(params["predictor"], x, given.poses, inverse_whitening(params["predictor"]))

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Key
 
 from a2g_jax.nn.flow.broadcast import of_channels
+from a2g_jax.nn.linear import linear
 from a2g_jax.nn.recurrent import gru_scan, gru_step, lstm_scan, lstm_step
 
 Params = dict[str, Any]
@@ -80,7 +81,7 @@ def init_coupling(key: Key[Array, ""], shape: Shape) -> Params:
 def project_condition(params: Params, condition: Float[Array, "*S D"]) -> Float[Array, "*S gates"]:
     """Contribution of the condition and the bias to the gates of the first layer: one product for all frames."""
     first = params["layer_0"]
-    projected: Float[Array, "*S gates"] = condition @ first["known_kernel"]
+    projected: Float[Array, "*S gates"] = linear(condition, first["known_kernel"])
     return projected + of_channels(first["input_bias"], projected)
 
 
@@ -93,12 +94,13 @@ def start_states(shape: Shape, count: int, dtype: Any = jnp.float32) -> States:
 def _over_time(params, shape, kept, history, condition):
     """Output of the recurrent layers for whole clips."""
     first = params["layer_0"]
-    projected = project_condition(params, condition) + history @ first["history_kernel"] + kept @ first["kept_kernel"]
+    projected = project_condition(params, condition) + linear(history, first["history_kernel"])
+    projected = projected + linear(kept, first["kept_kernel"])
     x = jnp.swapaxes(projected, 0, 1)
     for layer, state in enumerate(start_states(shape, kept.shape[0], kept.dtype)):
         weights = params[f"layer_{layer}"]
         if layer > 0:
-            x = x @ weights["input_kernel"] + of_channels(weights["input_bias"], x)
+            x = linear(x, weights["input_kernel"]) + of_channels(weights["input_bias"], x)
         if shape.cell == "lstm":
             x = lstm_scan(x, state, weights["state_kernel"], weights["state_bias"])[0]
         else:
@@ -122,7 +124,7 @@ def _one_frame(params, shape, kept, history, projected, states):
 
 
 def _scale_and_shift(params, shape, output, guidance=1.0):
-    raw = output @ params["out_kernel"]
+    raw = linear(output, params["out_kernel"])
     raw = raw + of_channels(params["out_bias"], raw)
     if guidance != 1.0:
         # The first half of the sequences have the whole condition, the second half lack what is guided.

@@ -69,6 +69,7 @@ def glow(
     x: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
     condition: Float[Array, "B T D"],
+    recompute: bool = False,
 ) -> tuple[Float[Array, "B T C"], Float[Array, "B T"]]:
     """Latents of a motion, and the log-determinant of every frame.
 
@@ -76,6 +77,7 @@ def glow(
         x: the motion.
         history: the poses before each frame, as its conditioning.
         condition: the rest of its conditioning: audio, style.
+        recompute: the gradient computes each step again from its input, in place of storing its states.
     """
 
     def step(carry, one):
@@ -84,7 +86,9 @@ def glow(
         x, more = coupling(one["coupling"], shape, x, history, condition)
         return (x, log_det + more + actnorm_log_det(one["actnorm"]) + invertible_log_det(one["invertible"])), None
 
-    (z, log_det), _ = jax.lax.scan(step, (x, jnp.zeros(x.shape[:2], x.dtype)), params)
+    # A scan separates both passes already, so that nothing has to prevent XLA from merging them.
+    body = jax.checkpoint(step, prevent_cse=False) if recompute else step
+    (z, log_det), _ = jax.lax.scan(body, (x, jnp.zeros(x.shape[:2], x.dtype)), params)
     return z, log_det
 
 
@@ -94,6 +98,7 @@ def glow_inverse(
     z: Float[Array, "B T C"],
     history: Float[Array, "B T H"],
     condition: Float[Array, "B T D"],
+    recompute: bool = False,
 ) -> Float[Array, "B T C"]:
     """The motion of latents, for all frames at once, since the history is given (teacher forcing)."""
 
@@ -101,7 +106,8 @@ def glow_inverse(
         x = coupling_inverse(one["coupling"], shape, x, history, condition)
         return actnorm_inverse(one["actnorm"], invertible_inverse(one["invertible"], x)), None
 
-    x, _ = jax.lax.scan(step, z, params, reverse=True)
+    body = jax.checkpoint(step, prevent_cse=False) if recompute else step
+    x, _ = jax.lax.scan(body, z, params, reverse=True)
     return x
 
 

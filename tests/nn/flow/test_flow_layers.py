@@ -261,3 +261,23 @@ class TestPriors:
         density = np.exp(np.asarray(log_prob(z, freedom) + log_det)).reshape(601, 601)
         mass = integrate.trapezoid(integrate.trapezoid(density, grid), grid)
         np.testing.assert_allclose(mass, 1.0, atol=2e-3)
+
+
+def test_the_gradient_that_computes_steps_again_is_the_same():
+    shape = shape_of("lstm")
+    params, data = trained(init_glow(KEY, shape, 2)), clips(shape)
+
+    def gradient(recompute):
+        def loss(params, x):
+            z, log_det = glow(params, shape, x, *data[1:], recompute)
+            return (
+                jnp.sum(jnp.square(z))
+                - jnp.sum(log_det)
+                + jnp.sum(glow_inverse(params, shape, x, *data[1:], recompute))
+            )
+
+        return jax.jit(jax.grad(loss, (0, 1)))
+
+    plain, again = gradient(False)(params, data[0]), gradient(True)(params, data[0])
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-4), plain, again)
+    assert "remat" in str(jax.make_jaxpr(gradient(True))(params, data[0]))
