@@ -92,16 +92,16 @@ def test_jobs_that_need_a_failed_one_are_left_out_and_the_others_run(tmp_path, c
 
 def test_a_signal_ends_what_runs_and_the_same_command_may_follow(tmp_path, capfd):
     started = tmp_path / "started"
-    jobs = [
-        _job("sleeps", f"open('{started}','w').write(str(__import__('os').getpid())) or __import__('time').sleep(600)")
-    ]
+    # One word, since commands are split at spaces.
+    code = f"[open('{started}','w').write(str(__import__('os').getpid())),__import__('time').sleep(600)]"
+    jobs = [_job("sleeps", code)]
 
     def end():
         while not started.exists() or not started.read_text():
             time.sleep(0.05)
         os.kill(os.getpid(), signal.SIGTERM)
 
-    threading.Thread(target=end).start()
+    threading.Thread(target=end, daemon=True).start()
     assert run(jobs, tmp_path, 1) == 130
     assert "the same command resumes" in capfd.readouterr().out
     with pytest.raises(ProcessLookupError):
