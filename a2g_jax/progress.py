@@ -3,6 +3,7 @@
 A server that runs the work has no terminal, and has to stop it on request: it watches the checkpoints.
 """
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -13,14 +14,27 @@ from tqdm import tqdm
 
 Item = TypeVar("Item")
 
+#: Columns and rows of a terminal that has none.
+_SIZE = {"ncols": 80, "nrows": 24}
+
 
 @contextmanager
 def progress_bar(total: int, what: str, unit: str) -> Iterator[tqdm]:
     """A bar with a rate and the remaining time; its line ends also on errors, so that messages start on a new one."""
-    every = 0.5 if sys.stderr.isatty() else 10.0
+    terminal = sys.stderr.isatty()
+    every = 0.5 if terminal else 10.0
+    size = _SIZE if terminal and _has_no_size() else {}
     # A bar inside another one vanishes at its end.
-    with tqdm(total=total, desc=what, unit=unit, file=sys.stderr, mininterval=every, leave=None) as bar:
+    with tqdm(total=total, desc=what, unit=unit, file=sys.stderr, mininterval=every, leave=None, **size) as bar:
         yield bar
+
+
+def _has_no_size() -> bool:
+    """Whether standard error is a terminal of no columns, as programs open them; a bar would not show there."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns == 0
+    except (OSError, ValueError):
+        return False
 
 
 def counted(items: Iterable[Item], bar: tqdm) -> Iterator[Item]:

@@ -367,3 +367,10 @@ def test_a_damaged_description_of_a_run_is_named(capsys, tmp_path, damage):
 def test_what_is_mistyped_has_a_suggestion(words, message, capsys):
     assert main(words.split()) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_mistyped_command_has_a_suggestion(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["genrate", "demo"])
+    assert stop.value.code == 2
+    assert "there is no command 'genrate'; did you mean generate?" in capsys.readouterr().err

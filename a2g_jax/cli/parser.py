@@ -41,6 +41,12 @@ class Parser(argparse.ArgumentParser):
         # An axis such as -z is the value of a flag, not a flag.
         return None if arg_string in ("-x", "-y", "-z") else super()._parse_optional(arg_string)
 
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        names = [str(name) for name in action.choices or ()]
+        if action.dest == "command" and value not in names and (similar := get_close_matches(str(value), names, 1)):
+            self.error(f"there is no command {value!r}; did you mean {similar[0]}?")
+        super()._check_value(action, value)
+
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"a2g: {message} (see '{self.prog} --help')\n")
 

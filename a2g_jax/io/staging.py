@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from a2g_jax.errors import InputError, OutputError
@@ -19,7 +19,7 @@ def staged(
     """Write files into a hidden folder, which move to ``out`` when the block ends well; else ``out`` stays as it was.
 
     Args:
-        out: the folder, made if needed.
+        out: the folder, made if needed, and removed again if nothing comes into it.
         replaced: whether a file of that name in ``out`` belongs to an earlier call, and is removed.
         keep: errors after which the files that are there move as well, unless the disk is full.
 
@@ -30,6 +30,7 @@ def staged(
         InputError: ``out`` is no folder; and errors of the block, in which ``out`` stands for the hidden folder.
         OutputError: a full disk, or a folder that cannot be written to.
     """
+    new = not Path(out).exists()
     folder = make_folder(out)
     hidden = temporary_path(folder / "files")
     try:
@@ -49,6 +50,9 @@ def staged(
         raise unwritable(out, error) from error
     finally:
         remove(hidden)
+        if new:
+            with suppress(OSError):  # files are in it
+                folder.rmdir()
 
 
 def _move(hidden: Path, folder: Path, replaced: Callable[[str], bool]) -> None:

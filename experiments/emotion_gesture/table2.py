@@ -87,7 +87,8 @@ TABLE = Table(
     (
         "Both rows of ours and the flow continue the clip's own 10 poses; Audio2Gestures and Speech2Gesture take no"
         " poses, which costs them L2. The flow has its published form with our linear first layer; Audio2Gestures is"
-        " that of its own tables, without stored codes and adversary. Neither takes emotions. All have the steps of our main stage.",
+        " that of its own tables, without stored codes and adversary. Neither takes emotions. All have the steps of our"
+        " main stage.",
     ),
 )
 

@@ -50,6 +50,19 @@ def test_after_an_error_all_is_as_before(earlier, error):
     assert names(earlier) == dict.fromkeys(("a.txt", "b.txt", "thesis.pdf"), "old")
 
 
+def test_a_new_folder_that_nothing_came_into_is_removed(tmp_path):
+    def fail(out):
+        with staged(out) as folder:
+            (folder / "a.txt").write_text("new")
+            raise KeyboardInterrupt
+
+    for out in (tmp_path / "new", tmp_path):
+        with pytest.raises(KeyboardInterrupt):
+            fail(out)
+    assert not (tmp_path / "new").exists()
+    assert tmp_path.is_dir()
+
+
 def test_what_is_refused_may_leave_what_was_before_it(earlier):
     def refuse(content):
         with staged(earlier, replaced, (InputError,)) as folder:
