@@ -174,7 +174,7 @@ def vertex_normals(points: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, 
 
 
 def _look(glb: Glb, part: dict[str, Any]) -> tuple[tuple[float, float, float], bool]:
-    """The base colour of a primitive's material, linear, and whether it is seen from behind."""
+    """The base colour of a primitive's material, linear, and whether it is visible from behind."""
     if "material" not in part:
         return _CLAY, False
     material = item(glb, "materials", part["material"], "meshes, material")

@@ -37,7 +37,7 @@ class Skin:
     weights: Float[np.ndarray, "V 4"]
     triangles: Int[np.ndarray, "F 3"]
     two_sided: bool = False
-    """Whether some triangles are to be seen from behind."""
+    """Whether some triangles are visible from behind."""
 
     def posed(self, rotations: Float[np.ndarray, "J 3 3"], root: Float[np.ndarray, "3"]) -> "Skin":
         """The vertices in a pose, bound as before: linear blend skinning.
