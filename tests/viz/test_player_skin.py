@@ -15,6 +15,7 @@ from a2g_jax.viz.player import Figure, write_page
 from a2g_jax.viz.player.skin import bind, make_skin
 from a2g_jax.viz.player.stage import shape_points
 from experiments.characters.decoded import Decoded
+from experiments.characters.rigs import mixamo
 from experiments.characters.skinned import SKINNED, mixamo_glb
 from tests.browser_for_tests import chromium
 from tests.viz.test_player_browser import opened
@@ -163,3 +164,49 @@ def test_merged_vertices_keep_colours_and_joints_apart():
     assert np.all(skin.joints[red, 0] == 3)
     assert np.all(skin.joints[~red, 0] == 5)
     assert len({*red[skin.triangles].sum(axis=1)} - {0, 3}) == 0
+
+
+@pytest.mark.parametrize(
+    ("count", "joints", "colours", "most"), [(6000, 3, 700, 500), (6000, 60, 700, 500), (70_000, 1, 1, 10**6)]
+)
+def test_parts_of_many_colours_and_directions_fit_too(count, joints, colours, most):
+    rng = np.random.default_rng(0)
+    skeleton = mixamo().skeleton()[0]
+    places = rng.normal(size=(count, 3)) * 0.01
+    normals = rng.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    weights = np.tile([1.0, 0, 0, 0], (count, 1))
+    owner = np.zeros((count, 4), int)
+    owner[:, 0] = rng.integers(0, joints, count)
+    surfaces = [
+        Surface(
+            tuple(rng.random(3)),
+            places[part],
+            normals[part],
+            owner[part],
+            weights[part],
+            np.arange(len(part) // 3 * 3).reshape(-1, 3),
+        )
+        for part in np.array_split(np.arange(count), colours)
+    ]
+    skin = make_skin(skeleton, surfaces, most=most)
+    assert len(skin.places) <= min(most, 65_536)
+    assert skin.triangles.max() < len(skin.places)
+    assert np.allclose(np.linalg.norm(skin.normals, axis=1), 1)
+    assert skin.joints[:, 0].max() == joints - 1
+
+
+def test_parts_of_too_many_joints_are_refused():
+    skeleton, count = mixamo().skeleton()[0], 600
+    owner = np.zeros((count, 4), int)
+    owner[:, 0] = np.arange(count) % 60
+    one = Surface(
+        (1.0, 1.0, 1.0),
+        np.zeros((count, 3)),
+        np.tile([0.0, 1, 0], (count, 1)),
+        owner,
+        np.tile([1.0, 0, 0, 0], (count, 1)),
+        np.arange(count).reshape(-1, 3),
+    )
+    with pytest.raises(InputError, match="too many parts for a page, which shows 50 vertices; export fewer"):
+        make_skin(skeleton, [one], most=50)
