@@ -8,6 +8,8 @@ import pytest
 from a2g_jax.errors import InputError
 from a2g_jax.generation.delivery import Delivery
 from a2g_jax.io.character import read_character
+from a2g_jax.io.gltf import mesh
+from a2g_jax.io.gltf.buffers import read_values
 from a2g_jax.io.gltf.container import read_glb, write_glb
 from a2g_jax.io.gltf.figure import Surface
 from a2g_jax.talker.recordings import talk
@@ -125,7 +127,11 @@ def test_compressed_meshes_are_left_to_our_figure(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda part, accessors: accessors[part["indices"]].update(count=10**9), "lies outside the binary data"),
+        (lambda part, accessors: accessors[part["indices"]].update(count=10**6), "lies outside the binary data"),
+        (
+            lambda part, accessors: accessors[part["indices"]].update(count=10**9),
+            "500000 vertices or 1000000 triangles",
+        ),
         (lambda part, accessors: accessors[part["attributes"]["JOINTS_0"]].update(count=1), "vertices are damaged"),
         (lambda part, accessors: accessors[part["attributes"]["POSITION"]].update(type="VEC2"), "expected VEC3"),
         (lambda part, accessors: part["attributes"].update(POSITION="a"), "does not exist"),
@@ -146,6 +152,28 @@ def test_damaged_meshes_are_refused_and_odd_ones_read(change, message, tmp_path)
         return
     with pytest.raises(InputError, match=message):
         character.surfaces()
+
+
+@pytest.mark.parametrize("limit", ["MOST_VERTICES", "MOST_CORNERS", None])
+def test_triangles_are_counted_before_they_are_read(limit, tmp_path, monkeypatch):
+    glb = read_glb(mixamo_glb(tmp_path / "mixamo.glb"))
+    parts = glb.document["meshes"][0]["primitives"]
+    parts[:] = [parts[0]] * 40  # one accessor for all, as a small file can have
+    write_glb(tmp_path / "many.glb", glb.document, glb.binary)
+    character, read = read_character(tmp_path / "many.glb"), []
+    one = glb.document["accessors"][parts[0]["attributes"]["POSITION"]]["count"]
+    corners = glb.document["accessors"][parts[0]["indices"]]["count"]
+    if limit is not None:
+        monkeypatch.setattr(mesh, limit, 3 * {"MOST_VERTICES": one, "MOST_CORNERS": corners}[limit])
+    monkeypatch.setattr(mesh, "read_values", lambda *given: read.append(given[-1]) or read_values(*given))
+    if limit is None:
+        assert len(character.surfaces()) == 40
+        return
+    with pytest.raises(
+        InputError, match=r"many\.glb, meshes: have more than \d+ vertices or \d+ triangles; export fewer"
+    ):
+        character.surfaces()
+    assert not any("primitives[3]" in place for place in read)
 
 
 def test_merged_vertices_keep_colours_and_joints_apart():

@@ -83,6 +83,15 @@ def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray |
     return values[:, 0] if shape == "SCALAR" else values
 
 
+def element_count(glb: Glb, index: object, place: str) -> int:
+    """How many elements an accessor has, which are not read.
+
+    Raises:
+        InputError: there is no such accessor, or it is damaged.
+    """
+    return _whole(glb, item(glb, "accessors", index, place).get("count"), place)
+
+
 def item(glb: Glb, key: str, index: object, place: str) -> dict[str, Any]:
     """An object of a list of the file.
 
