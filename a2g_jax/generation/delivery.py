@@ -74,13 +74,13 @@ class Delivery:
         if "skin" not in self._kept:
             from a2g_jax.viz.player.skin import make_skin
 
+            self._kept["skin"] = None
             try:
                 self._kept["skin"] = make_skin(skeleton, self.character.surfaces())
-                reason = f"{self.character.path}: its mesh is compressed"
             except InputError as error:
-                self._kept["skin"], reason = None, str(error).rstrip(".")
-            if self._kept["skin"] is None and self.character.suffix != ".bvh":
-                self._kept["unread"] = [f"{reason}; the page shows our figure in its place"]
+                path = str(self.character.path)
+                reason = str(error) if str(error).startswith(path) else f"{path}: {error}"
+                self._kept["unread"] = [f"{reason.rstrip('.')}; the page shows our figure in its place"]
         found: Skin | None = self._kept["skin"]
         return found
 
