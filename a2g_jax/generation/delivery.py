@@ -84,6 +84,22 @@ class Delivery:
         found: Skin | None = self._kept["skin"]
         return found
 
+    def page_points(self, skeleton: Skeleton) -> int:
+        """Most points of a figure that a page has in every frame, for motions of a run's skeleton: the joints, or three
+        of each joint of a mesh that the run moves.
+
+        Raises:
+            InputError: as :meth:`match`.
+        """
+        if self.character is None:
+            return skeleton.joints
+        joints = self.character.rig.skeleton.joints
+        if self.character.suffix == ".bvh":
+            return joints
+        matched = self._matched(skeleton)
+        moved = {0, *(pair.target for pair in matched.pairs), *(share.target for share in matched.shares)}
+        return max(joints, 3 * len(moved))
+
     def _matched(self, skeleton: Skeleton) -> Match:
         # All motions of a run have the same skeleton; its rig is found once.
         if "match" not in self._kept or not self._kept["match"].source.skeleton.same_tree(skeleton):

@@ -1,6 +1,7 @@
 """The mesh of a character on the page."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from a2g_jax.io.gltf.container import read_glb, write_glb
 from a2g_jax.io.gltf.figure import Surface
 from a2g_jax.talker.recordings import talk
 from a2g_jax.viz.player import Figure, write_page
+from a2g_jax.viz.player.page import moved_points
 from a2g_jax.viz.player.skin import bind, make_skin
 from a2g_jax.viz.player.stage import shape_points
 from experiments.characters.decoded import Decoded
@@ -93,6 +95,26 @@ def test_a_page_has_the_mesh_once(motion, tmp_path):
     assert len(data["meshes"]) == 1
     assert [figure.get("mesh") for figure in data["figures"]] == [0, 0, 0, None]
     assert len(data["meshes"][0]["data"]) < 200_000
+
+
+def test_a_page_has_the_mesh_of_two_readings_once(motion, tmp_path):
+    path = mixamo_glb(tmp_path / "mixamo.glb")
+    deliveries = [Delivery(character=read_character(path)) for _ in range(2)]
+    figures = []
+    for delivery in deliveries:  # as of two takes of the studio
+        shown = delivery.make(motion).shown
+        figures.append(Figure(shown, "sample", skin=delivery.skin(shown.skeleton)))
+    assert figures[0].skin is not figures[1].skin
+    other = replace(figures[0], skin=replace(figures[0].skin, two_sided=True))
+    write_page(tmp_path / "page.html", [*figures, other], np.zeros(0), 16000, title="mesh")
+    data = page_data((tmp_path / "page.html").read_text())
+    assert [figure["mesh"] for figure in data["figures"]] == [0, 0, 1]
+    points = {figure["points"] for figure in data["figures"][:2]}
+    assert points == {moved_points(figures) + 2}  # and the two wrists
+    # What is checked before anything is generated is enough, and less than of all joints.
+    most = deliveries[0].page_points(motion.skeleton)
+    assert moved_points(figures) <= most < 3 * shown.skeleton.joints
+    assert moved_points([Figure(shown, "without")]) == shown.skeleton.joints
 
 
 @pytest.mark.browser

@@ -1,9 +1,11 @@
 """The skinned mesh of a character on the page: light enough to be drawn without a GPU, and bound to few joints."""
 
 import base64
+import hashlib
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -41,6 +43,16 @@ class Skin:
     triangles: Int[np.ndarray, "F 3"]
     two_sided: bool = False
     """Whether some triangles are visible from behind."""
+
+    @cached_property
+    def content(self) -> str:
+        """A digest of the skeleton and the mesh, equal for equal ones, such as of two readings of a file."""
+        of, skeleton = hashlib.sha256(), self.skeleton
+        of.update(repr((skeleton.names, skeleton.parents, skeleton.ends, self.two_sided)).encode())
+        arrays = (self.places, self.normals, self.colours, self.joints, self.weights, self.triangles)
+        for array in (np.asarray(skeleton.offsets), *arrays):
+            of.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).tobytes())
+        return of.hexdigest()
 
     def posed(self, rotations: Float[np.ndarray, "J 3 3"], root: Float[np.ndarray, "3"]) -> "Skin":
         """The vertices in a pose, bound as before: linear blend skinning.
