@@ -110,4 +110,7 @@ def _application(options: argparse.Namespace, settings: Any) -> tuple[Any, dict[
     print("compiling; a minute the first time, seconds later", flush=True)
     service.warm_up()
     security = Security(options.host, tuple(options.allow_host))
-    return make_app(routes(service, options.run), security, lifespan(service)), SERVER_OPTIONS
+    answers = routes(service, options.run)
+    for line in delivery.lines():  # once the page has been made, for which the mesh is read
+        print(line, flush=True)
+    return make_app(answers, security, lifespan(service)), SERVER_OPTIONS

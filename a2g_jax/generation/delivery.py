@@ -74,15 +74,31 @@ class Delivery:
         if "skin" not in self._kept:
             from a2g_jax.viz.player.skin import make_skin
 
+            self._kept["skin"] = None
             try:
                 self._kept["skin"] = make_skin(skeleton, self.character.surfaces())
-                reason = f"{self.character.path}: its mesh is compressed"
             except InputError as error:
-                self._kept["skin"], reason = None, str(error).rstrip(".")
-            if self._kept["skin"] is None and self.character.suffix != ".bvh":
-                self._kept["unread"] = [f"{reason}; the page shows our figure in its place"]
+                path = str(self.character.path)
+                reason = str(error) if str(error).startswith(path) else f"{path}: {error}"
+                self._kept["unread"] = [f"{reason.rstrip('.')}; the page shows our figure in its place"]
         found: Skin | None = self._kept["skin"]
         return found
+
+    def page_points(self, skeleton: Skeleton) -> int:
+        """Most points of a figure that a page has in every frame, for motions of a run's skeleton: the joints, or three
+        of each joint of a mesh that the run moves.
+
+        Raises:
+            InputError: as :meth:`match`.
+        """
+        if self.character is None:
+            return skeleton.joints
+        joints = self.character.rig.skeleton.joints
+        if self.character.suffix == ".bvh":
+            return joints
+        matched = self._matched(skeleton)
+        moved = {0, *(pair.target for pair in matched.pairs), *(share.target for share in matched.shares)}
+        return max(joints, 3 * len(moved))
 
     def _matched(self, skeleton: Skeleton) -> Match:
         # All motions of a run have the same skeleton; its rig is found once.

@@ -78,9 +78,8 @@ def export(
         raise InputError(f"order {order!r}: expected {' or '.join(ORDERS)}.")
     audio, config = speech_at_rate(run, audio, sample_rate), run.config
     if PAGE in formats:
-        skeleton = config.skeleton if delivery.character is None else delivery.character.rig.skeleton
         frames = round(audio_frames(run, audio) * (delivery.fps or config.fps) / config.fps)
-        check_page_size(samples, frames, skeleton.joints)
+        check_page_size(samples, frames, delivery.page_points(config.skeleton))
     checked = sampler if isinstance(sampler, Checked) else Checked(run, sampler)
     motions: Iterable[Motion] = checked.stream(audio, samples, seed)
     scorer = None

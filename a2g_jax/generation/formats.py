@@ -131,13 +131,16 @@ def chosen_formats(text: str, available: Sequence[str]) -> tuple[str, ...]:
     return formats
 
 
-def check_page_size(motions: int, frames: int, joints: int) -> None:
+def check_page_size(motions: int, frames: int, points: int) -> None:
     """Refuse a page that is too large for a browser.
 
+    Args:
+        points: of a figure in a frame: its joints, or three of each bone of a mesh.
+
     Raises:
-        InputError: too many joint positions.
+        InputError: too many positions.
     """
-    if motions * frames * joints > _PAGE_LIMIT:
+    if motions * frames * points > _PAGE_LIMIT:
         raise InputError(
             f"a page of {motions} motions of {frames} frames would be too large for a browser;"
             " reduce --samples or the length, or leave html out of --formats."

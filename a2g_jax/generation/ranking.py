@@ -23,6 +23,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import ndimage
 
+from a2g_jax.errors import InputError
 from a2g_jax.generation.generator import speech_at_rate
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.io.files import read_json
@@ -56,7 +57,28 @@ def read_scores(folder: str | os.PathLike[str]) -> list[Score]:
     Raises:
         InputError: there is no such file, or it is damaged.
     """
-    return [Score(**row) for row in read_json(Path(folder) / "checks.json").get("scores", ())]
+    path = Path(folder) / "checks.json"
+    checks = read_json(path)
+    rows = checks.get("scores", []) if isinstance(checks, dict) else None
+    if not isinstance(rows, list):
+        raise InputError(f"{path}: not the checks of samples; generate them again with --order best.")
+    return [_read_score(path, number, row) for number, row in enumerate(rows)]
+
+
+def _read_score(path: Path, number: int, row: Any) -> Score:
+    kinds = Score.__annotations__
+    if (
+        not isinstance(row, dict)
+        or set(row) != set(kinds)
+        or any(not _is_number(row[name], kinds[name]) for name in row)
+    ):
+        expected = f"expected numbers {', '.join(kinds)}"
+        raise InputError(f"{path}: scores[{number}]: {expected}; generate the samples again with --order best.")
+    return Score(**row)
+
+
+def _is_number(value: object, kind: type) -> bool:
+    return isinstance(value, int if kind is int else (int, float)) and not isinstance(value, bool)
 
 
 class Scorer:

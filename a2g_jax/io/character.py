@@ -34,7 +34,11 @@ class Character(Protocol):
 
     def surfaces(self) -> "list[Surface]":
         """The meshes in the rig's reference pose, in the plain axes of
-        :func:`~a2g_jax.geometry.retarget.upright.upright_motion` and metres; empty without any that can be read."""
+        :func:`~a2g_jax.geometry.retarget.upright.upright_motion` and metres; empty for a kind of file without meshes.
+
+        Raises:
+            InputError: there are none, or they cannot be read.
+        """
         ...
 
     def write(self, path: Path, motion: "Motion") -> dict[str, float]:

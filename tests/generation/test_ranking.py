@@ -103,3 +103,22 @@ def test_export_keeps_names_and_writes_the_order(run, tmp_path):
     assert "best first" not in plain
     with pytest.raises(InputError, match="order 'worst': expected number or best"):
         export(run, Given(motions), SPEECH.audio, tmp_path / "no", order="worst", **about)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", r"checks\.json: not the checks of samples; generate them again with --order best"),
+        ('{"scores": 3}', r"checks\.json: not the checks of samples"),
+        ('{"scores": [{}]}', r"checks\.json: scores\[0\]: expected numbers sample, score, .* --order best"),
+        ('{"scores": [[1, 2]]}', r"scores\[0\]: expected numbers"),
+        (
+            '{"scores": [{"sample": "0", "score": 1, "agreement": 1, "correlation": 0, "body": 0, "usual": 0}]}',
+            r"scores\[0\]: expected numbers",
+        ),
+    ],
+)
+def test_damaged_scores_are_refused(text, message, tmp_path):
+    (tmp_path / "checks.json").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_scores(tmp_path)

@@ -7,8 +7,10 @@ import sys
 
 import pytest
 
-from a2g_jax.cli import main
+from a2g_jax.cli import main, serve
+from a2g_jax.io.gltf.container import read_glb, write_glb
 from a2g_jax.serving import run
+from experiments.characters.skinned import mixamo_glb
 
 
 @pytest.mark.parametrize(
@@ -60,3 +62,17 @@ def test_the_url_is_printed_and_ctrl_c_ends_without_a_traceback():
         server.send_signal(signal.SIGINT)
         out, err = server.communicate(timeout=60)
     assert (server.returncode, out, err) == (0, "stopped.\n", "")
+
+
+def test_a_mesh_that_is_not_read_is_named(tmp_path, monkeypatch, capsys):
+    glb = read_glb(mixamo_glb(tmp_path / "mixamo.glb"))
+    for part in glb.document["meshes"][0]["primitives"]:
+        part["extensions"] = {"KHR_draco_mesh_compression": {}}
+    write_glb(tmp_path / "draco.glb", glb.document, glb.binary)
+    monkeypatch.setattr("a2g_jax.serving.live.service.Service.warm_up", lambda service: None)
+    monkeypatch.setattr(serve, "serve", lambda app, bound, announce, **options: bound.close())
+    assert main(["serve", "demo", "--port", "0", "--to", str(tmp_path / "draco.glb")]) == 0
+    out = capsys.readouterr().out
+    assert out.count("draco.glb") == 1
+    assert "is compressed (Draco)" in out
+    assert "the page shows our figure in its place" in out

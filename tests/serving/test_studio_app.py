@@ -177,7 +177,7 @@ def test_a_running_request_is_cancelled_and_leaves_no_files(client, studio, gene
     assert studio.find(generate(client, studio)).outcome.seconds == SECONDS
 
 
-def test_work_that_goes_on_after_its_take_is_dropped_leaves_no_files(client, studio, monkeypatch, recording):
+def test_work_that_continues_after_its_take_is_dropped_leaves_no_files(client, studio, monkeypatch, recording):
     reached, go = threading.Event(), threading.Event()
 
     def deaf(arguments, folder, job):

@@ -15,9 +15,9 @@ def _read(path):
     return {"seconds": 2.0, "warnings": [f"{path}: is doubtful."]}
 
 
-def small(folder, **options):
+def small(folder, files=2, **options):
     kinds = {"speech": Kind("speech", (".wav", ".mp4"), 1000, _read)}
-    return Uploads(folder, kinds, files=2, most_bytes=500, **options)
+    return Uploads(folder, kinds, files=files, most_bytes=500, **options)
 
 
 @pytest.fixture
@@ -96,6 +96,17 @@ def test_the_oldest_files_make_room_unless_they_are_used(tmp_path):
 def test_many_bytes_make_room_as_well(uploads):
     first, second = send(uploads, b"x" * 300), send(uploads, b"x" * 300)
     assert (first.path.exists(), second.path.exists()) == (False, True)
+
+
+def test_a_file_without_room_removes_none(tmp_path):
+    used = []
+    uploads = small(tmp_path, files=3, in_use=lambda: used)
+    old, new = send(uploads, b"x" * 100), send(uploads, b"x" * 300)
+    used.append(new.path)
+    with pytest.raises(InputError, match="too many files arrive"), uploads.incoming("speech", "large.wav") as large:
+        large.write(b"x" * 300)
+    assert [one.path.exists() for one in (old, new)] == [True, True]
+    assert uploads.all() == [old, new]
 
 
 def test_files_that_arrive_count_and_give_their_room_back(uploads, tmp_path):

@@ -29,11 +29,9 @@ def read_matrices(glb: Glb, index: object, count: int, place: str) -> np.ndarray
     length = _whole(glb, accessor.get("count"), place)
     if length < count:
         fail(glb.path, place, f"expected {count} matrices, one a joint; got {length}; export it again.")
-    if "sparse" in accessor or "bufferView" not in accessor:
+    if why_not_plain(glb, index, place) is not None:
         return None
     view = item(glb, "bufferViews", accessor["bufferView"], place)
-    if view.get("buffer") != 0 or "uri" in item(glb, "buffers", 0, place) or view.get("extensions"):
-        return None
     begin = _whole(glb, view.get("byteOffset", 0), place) + _whole(glb, accessor.get("byteOffset", 0), place)
     step = _whole(glb, view.get("byteStride", 64) or 64, place)
     end = begin + step * (count - 1) + 64
@@ -46,17 +44,36 @@ def read_matrices(glb: Glb, index: object, count: int, place: str) -> np.ndarray
     return np.swapaxes(rows, -1, -2)
 
 
-def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray | None:
-    """The elements of an accessor, (count,) or (count, width), normalised ones from -1 or 0 to 1.
+def why_not_plain(glb: Glb, index: object, place: str) -> str | None:
+    """Why the elements of an accessor are not plain numbers in the file, with the remedy; None where they are.
 
-    None where they are sparse, compressed or in another file.
+    Raises:
+        InputError: there is no such accessor, or it is damaged.
+    """
+    accessor = item(glb, "accessors", index, place)
+    if "sparse" in accessor:
+        return "is a sparse accessor, which is not read; export it without sparse accessors."
+    if "bufferView" not in accessor:
+        return "has no data in the file; export it again without compression."
+    view = item(glb, "bufferViews", accessor["bufferView"], place)
+    if extensions := view.get("extensions"):
+        names = ", ".join(extensions) if isinstance(extensions, dict) else "an extension"
+        return f"is compressed ({names}), which is not read; export it without compression."
+    if view.get("buffer") != 0 or "uri" in item(glb, "buffers", 0, place):
+        return "is in another file or in text, which is not read; export it as one binary file (.glb)."
+    return None
+
+
+def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray:
+    """The elements of an accessor, (count,) or (count, width), normalised ones from -1 or 0 to 1.
 
     Args:
         shape: ``SCALAR``, ``VEC3`` or ``VEC4``.
         place: of the accessor in the file, for messages.
 
     Raises:
-        InputError: there is no such accessor, it is of another type, or lies outside the file.
+        InputError: there is no such accessor, it is of another type, lies outside the file, or is sparse, compressed or
+            in another file.
     """
     accessor = item(glb, "accessors", index, place)
     component = accessor.get("componentType")
@@ -64,11 +81,9 @@ def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray |
     if accessor.get("type") != shape or kind is None:
         fail(glb.path, place, f"expected {shape}; the file is damaged: export it again.")
     count = _whole(glb, accessor.get("count"), place)
-    if "sparse" in accessor or "bufferView" not in accessor:
-        return None
+    if (reason := why_not_plain(glb, index, place)) is not None:
+        fail(glb.path, place, reason)
     view = item(glb, "bufferViews", accessor["bufferView"], place)
-    if view.get("buffer") != 0 or "uri" in item(glb, "buffers", 0, place) or view.get("extensions"):
-        return None
     width = _WIDTHS[shape]
     size = np.dtype(kind).itemsize
     begin = _whole(glb, view.get("byteOffset", 0), place) + _whole(glb, accessor.get("byteOffset", 0), place)
@@ -81,6 +96,15 @@ def read_values(glb: Glb, index: object, shape: str, place: str) -> np.ndarray |
     if accessor.get("normalized") is True and largest:
         values = np.maximum(values / largest, -1.0)
     return values[:, 0] if shape == "SCALAR" else values
+
+
+def element_count(glb: Glb, index: object, place: str) -> int:
+    """How many elements an accessor has, which are not read.
+
+    Raises:
+        InputError: there is no such accessor, or it is damaged.
+    """
+    return _whole(glb, item(glb, "accessors", index, place).get("count"), place)
 
 
 def item(glb: Glb, key: str, index: object, place: str) -> dict[str, Any]:

@@ -55,10 +55,10 @@ class GlbCharacter:
         return found
 
     def surfaces(self) -> list[Surface]:
-        """The meshes in the reference pose, in plain axes and metres; empty where they are compressed.
+        """The meshes in the reference pose, in plain axes and metres.
 
         Raises:
-            InputError: they are damaged.
+            InputError: there are none, or they are compressed or damaged.
         """
         return read_surfaces(self._glb, self._found, self.metres)
 

@@ -32,7 +32,7 @@ class Surface:
     """Of the joints; their sum is 1."""
     triangles: Int[np.ndarray, "F 3"]
     two_sided: bool = False
-    """Whether triangles are seen from behind as well."""
+    """Whether triangles are visible from behind as well."""
 
 
 def figure_document(

@@ -12,21 +12,23 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from a2g_jax.geometry.retarget.match_table import body_frame_of, body_places
-from a2g_jax.io.gltf.buffers import item, read_matrices, read_values
+from a2g_jax.io.gltf.buffers import element_count, item, read_matrices, read_values, why_not_plain
 from a2g_jax.io.gltf.container import Glb, fail
 from a2g_jax.io.gltf.figure import Surface
 from a2g_jax.io.gltf.nodes import Node, ancestors, placed, read_nodes
 from a2g_jax.io.gltf.rig import NodeRig
 
-#: Most vertices that are read of a character.
-MOST_VERTICES = 500_000
+#: Most vertices, and most corners of triangles, that are read of a character.
+MOST_VERTICES, MOST_CORNERS = 500_000, 3_000_000
 #: Linear colour of parts whose own is in a texture.
 _CLAY = (0.36, 0.33, 0.30)
 _TRIANGLES = 4
+#: Attributes that are read, with their types.
+_READ = {"POSITION": "VEC3", "NORMAL": "VEC3", "JOINTS_0": "VEC4", "WEIGHTS_0": "VEC4"}
 
 
 def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
-    """The meshes that move with the rig, one surface a primitive; empty where they cannot be read without a decoder.
+    """The meshes that move with the rig, one surface a primitive.
 
     A mesh without a skin is rigid to the joint above it, and left out where there is none. Colours are the base colours
     of the materials; textures are not read.
@@ -35,7 +37,8 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
         metres: in one unit of the rig's lengths.
 
     Raises:
-        InputError: an accessor that is damaged, or too many vertices.
+        InputError: no such mesh, one that cannot be read without a decoder, an accessor that is damaged, or too many
+            vertices or triangles.
     """
     nodes = read_nodes(glb)
     order = {node: joint for joint, node in enumerate(found.nodes)}
@@ -44,7 +47,7 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
     turns = metres * body @ found.rig.rest_world
     places = metres * body_places(found.rig)
     places -= places[0]
-    surfaces, total = [], 0
+    surfaces, room = [], [MOST_VERTICES, MOST_CORNERS]
     for index, row in enumerate(glb.document.get("nodes", [])):
         if "mesh" not in row:
             continue
@@ -53,18 +56,11 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
         if skin is None and not owners:
             continue
         bones = _rigid(glb, nodes, index, found, owners[0]) if skin is None else _bones(glb, nodes, skin, found, order)
-        if bones is None:
-            return []
         joints, matrices = bones
         bound = turns[joints] @ matrices[:, :3]
         bound[..., 3] += places[joints]
-        for part in _primitives(glb, row["mesh"]):
-            if part is None:
-                return []
+        for part in _primitives(glb, row["mesh"], room):
             points, normals, own, weights, triangles, (colour, two_sided) = part
-            total += len(points)
-            if total > MOST_VERTICES:
-                fail(glb.path, "meshes", f"have more than {MOST_VERTICES} vertices; export fewer objects.")
             if skin is None or own is None or weights is None:
                 own, weights = np.zeros((len(points), 4), int), np.tile([1.0, 0, 0, 0], (len(points), 1))
             if own.max(initial=0) >= len(joints) or own.min(initial=0) < 0:
@@ -76,14 +72,15 @@ def read_surfaces(glb: Glb, found: NodeRig, metres: float) -> list[Surface]:
                 facing += share * (moves[..., :3] @ normals[..., None])[..., 0]
             facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-12)
             surfaces.append(Surface(colour, moved, facing, joints[own], weights, triangles, two_sided))
+    if not any(len(surface.triangles) for surface in surfaces):
+        fail(glb.path, "meshes", "no triangles that move with the joints; export the character with its mesh.")
     return surfaces
 
 
 def _bones(
     glb: Glb, nodes: list[Node], skin: object, found: NodeRig, order: dict[int, int]
-) -> tuple[Int[np.ndarray, " K"], Float[np.ndarray, "K 4 4"]] | None:
-    """For each joint of a skin, the rig's joint that it moves with, and the offset from it of what is bound: None where
-    the matrices cannot be read."""
+) -> tuple[Int[np.ndarray, " K"], Float[np.ndarray, "K 4 4"]]:
+    """For each joint of a skin, the rig's joint that it moves with, and the offset from it of what is bound."""
     place = f"skins[{skin!r:.20}]"
     row = item(glb, "skins", skin, place)
     listed = row.get("joints", [])
@@ -91,7 +88,8 @@ def _bones(
     if "inverseBindMatrices" in row:
         inverse = read_matrices(glb, row["inverseBindMatrices"], len(listed), place)
     if inverse is None:
-        return None
+        reason = why_not_plain(glb, row["inverseBindMatrices"], place)
+        fail(glb.path, f"{place}, inverseBindMatrices", reason or "cannot be read; export it again.")
     where = placed(glb, nodes, [*listed, *found.nodes])
     joints, matrices = np.zeros(len(listed), int), np.zeros((len(listed), 4, 4))
     for at, node in enumerate(listed):
@@ -123,8 +121,26 @@ def _offset(found: NodeRig, where: Any, joint: int, node: int) -> Float[np.ndarr
     return matrix
 
 
-def _primitives(glb: Glb, mesh: object) -> Iterator[tuple[Any, ...] | None]:
-    """Places, normals, joints, weights, triangles and look of primitives of triangles; None for a compressed one."""
+def _take(room: list[int], glb: Glb, part: dict[str, Any], place: str) -> None:
+    """Take what a primitive needs from the vertices and corners that may still be read, before any is."""
+    counts = {name: element_count(glb, part["attributes"][name], place) for name in _READ if name in part["attributes"]}
+    if len(set(counts.values())) > 1:
+        fail(glb.path, place, "its vertices are damaged; export it again.")
+    vertices = counts["POSITION"]
+    corners = element_count(glb, part["indices"], place) if "indices" in part else vertices
+    room[0] -= vertices
+    room[1] -= corners
+    if min(room) < 0:
+        most = f"{MOST_VERTICES} vertices or {MOST_CORNERS // 3} triangles"
+        fail(glb.path, "meshes", f"have more than {most}; export fewer objects.")
+
+
+def _primitives(glb: Glb, mesh: object, room: list[int]) -> Iterator[tuple[Any, ...]]:
+    """Places, normals, joints, weights, triangles and look of primitives of triangles.
+
+    Args:
+        room: vertices and corners of triangles that may still be read; those of the primitives are taken from it.
+    """
     row = item(glb, "meshes", mesh, "nodes, mesh")
     parts = row.get("primitives", [])
     for number, part in enumerate(parts if isinstance(parts, list) else []):
@@ -136,21 +152,18 @@ def _primitives(glb: Glb, mesh: object) -> Iterator[tuple[Any, ...] | None]:
             continue
         extensions = part.get("extensions")
         if isinstance(extensions, dict) and "KHR_draco_mesh_compression" in extensions:
-            yield None
-            return
+            fail(glb.path, place, "is compressed (Draco), which is not read; export it without compression.")
         values: dict[str, Any] = {}
-        for name, shape in (("POSITION", "VEC3"), ("NORMAL", "VEC3"), ("JOINTS_0", "VEC4"), ("WEIGHTS_0", "VEC4")):
+        _take(room, glb, part, place)
+        for name, shape in _READ.items():
             if name in attributes:
                 values[name] = read_values(glb, attributes[name], shape, f"{place}, {name}")
-        indices: Any = np.arange(len(values["POSITION"])) if values["POSITION"] is not None else None
+        indices: Any = np.arange(len(values["POSITION"]))
         if "indices" in part:
             indices = read_values(glb, part["indices"], "SCALAR", f"{place}, indices")
-        if indices is None or any(value is None for value in values.values()):
-            yield None
-            return
         points, joints, weights = (values.get(name) for name in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
         count = len(values["POSITION"])
-        if any(len(value) != count or not np.isfinite(value).all() for value in values.values()):
+        if not all(np.isfinite(value).all() for value in values.values()):
             fail(glb.path, place, "its vertices are damaged; export it again.")
         if len(indices) and not (indices.min() >= 0 and indices.max() < count):
             fail(glb.path, place, "a triangle has a vertex that does not exist; export it again.")
@@ -174,7 +187,7 @@ def vertex_normals(points: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, 
 
 
 def _look(glb: Glb, part: dict[str, Any]) -> tuple[tuple[float, float, float], bool]:
-    """The base colour of a primitive's material, linear, and whether it is seen from behind."""
+    """The base colour of a primitive's material, linear, and whether it is visible from behind."""
     if "material" not in part:
         return _CLAY, False
     material = item(glb, "materials", part["material"], "meshes, material")

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from a2g_jax.errors import InputError
 from a2g_jax.generation.formats import check_page_size
 from a2g_jax.serving.studio.takes import Take
-from a2g_jax.viz.player.page import page_html
+from a2g_jax.viz.player.page import moved_points, page_html
 
 
 def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
@@ -25,8 +25,7 @@ def takes_page(shown: Iterable[tuple[Take, int]], title: str) -> str:
     figures = [
         take.figure(sample, label.format(take.number, sample), None if several else sample) for take, sample in chosen
     ]
-    longest = max(figures, key=lambda figure: figure.motion.frames * figure.motion.skeleton.joints).motion
-    check_page_size(len(figures), longest.frames, longest.skeleton.joints)
+    check_page_size(len(figures), max(figure.motion.frames for figure in figures), moved_points(figures))
     audio, rate = first.speech()
     return page_html(
         figures,

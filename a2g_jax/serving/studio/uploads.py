@@ -111,7 +111,7 @@ class Uploads:
         use, are removed.
 
         Raises:
-            InputError: files that arrive and those in use are more than is kept.
+            InputError: files that arrive and those in use are more than is kept; none is removed.
         """
         in_use = set(self._in_use())
         with self._lock:
@@ -119,16 +119,18 @@ class Uploads:
             own = [upload for upload in self._kept.values() if not upload.keep]
             count = len(own) + len(self._arriving)
             total = sum(upload.size for upload in own) + sum(self._arriving.values())
+            removed = []
             for upload in own:
                 if count <= self._files and total <= self._bytes:
-                    return
-                if upload.path in in_use:
-                    continue
-                count, total = count - 1, total - upload.size
-                del self._kept[upload.id]
-                upload.path.unlink(missing_ok=True)
+                    break
+                if upload.path not in in_use:
+                    count, total = count - 1, total - upload.size
+                    removed.append(upload)
             if count > self._files or total > self._bytes:
                 raise InputError("too many files arrive at the same time; wait for the others, and send it again.")
+            for upload in removed:
+                del self._kept[upload.id]
+                upload.path.unlink(missing_ok=True)
 
     def arrived(self, id: str) -> None:
         """Count a file as arriving no longer."""

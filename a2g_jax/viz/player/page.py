@@ -155,27 +155,39 @@ def _lone(text: str) -> bool:
     return re.search("[\ud800-\udfff]", text) is not None
 
 
-def _bound(figures: Sequence[Figure]) -> dict[int, Bound]:
-    """The meshes of the figures, each once, by the identity of their skins."""
-    skins = {id(figure.skin): figure.skin for figure in figures if figure.skin is not None}
-    return {
-        key: bind(skin, [figure.motion for figure in figures if figure.skin is skin and figure.motion.frames])
-        for key, skin in skins.items()
-    }
+def _bound(figures: Sequence[Figure]) -> dict[str, Bound]:
+    """The meshes of the figures, each once, by the content of their skins."""
+    skins = {figure.skin.content: figure.skin for figure in figures if figure.skin is not None}
+    return {key: bind(skin, _motions(figures, key)) for key, skin in skins.items()}
 
 
-def _figure(figure: Figure, bound: Mapping[int, Bound]) -> dict:
+def _motions(figures: Sequence[Figure], content: str) -> list[Motion]:
+    """Those of a mesh."""
+    of = [figure for figure in figures if figure.skin is not None and figure.skin.content == content]
+    return [figure.motion for figure in of if figure.motion.frames]
+
+
+def moved_points(figures: Sequence[Figure]) -> int:
+    """The largest number of points of a figure that the page has in every frame: three of each bone of a mesh, else the
+    joints."""
+    bones = {key: 3 * len(bound.joints) for key, bound in _bound(figures).items()}
+    return max(
+        figure.motion.skeleton.joints if figure.skin is None else bones[figure.skin.content] for figure in figures
+    )
+
+
+def _figure(figure: Figure, bound: Mapping[str, Bound]) -> dict:
     motion = figure.motion
     if motion.frames == 0:
         raise InputError(f"figure {figure.label!r}: the motion has no frames; give it at least one.")
     if not motion.fps > 0:
         raise InputError(f"figure {figure.label!r}: {motion.fps} frames per second; give a positive number.")
     body, points = drawn_body(motion)
-    mesh = bound.get(id(figure.skin))
-    if mesh is not None:
+    if figure.skin is not None:
+        mesh = bound[figure.skin.content]
         body, shape = drawn_mesh(body, mesh)
         points = shape_points(motion, shape)
-        body["mesh"] = list(bound).index(id(figure.skin))
+        body["mesh"] = list(bound).index(figure.skin.content)
     encoded = encode_positions(points, figure.label)
     return {
         "label": figure.label,

@@ -1,13 +1,16 @@
 """The skinned mesh of a character on the page: light enough to be drawn without a GPU, and bound to few joints."""
 
 import base64
+import hashlib
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.gltf.figure import Surface
@@ -16,6 +19,8 @@ from a2g_jax.viz.player.roles import ancestors, find_roles, rest_positions
 
 #: Most vertices of a mesh on the page; those of larger ones are merged.
 MOST_VERTICES = 4000
+#: Most vertices that 16-bit triangles of the page can have.
+_INDICES = 65_536
 #: Length of the axes of a joint on the page, metres.
 _AXIS = 0.25
 #: Largest difference in a rotation matrix of a joint that counts as not moving.
@@ -37,7 +42,17 @@ class Skin:
     weights: Float[np.ndarray, "V 4"]
     triangles: Int[np.ndarray, "F 3"]
     two_sided: bool = False
-    """Whether some triangles are to be seen from behind."""
+    """Whether some triangles are visible from behind."""
+
+    @cached_property
+    def content(self) -> str:
+        """A digest of the skeleton and the mesh, equal for equal ones, such as of two readings of a file."""
+        of, skeleton = hashlib.sha256(), self.skeleton
+        of.update(repr((skeleton.names, skeleton.parents, skeleton.ends, self.two_sided)).encode())
+        arrays = (self.places, self.normals, self.colours, self.joints, self.weights, self.triangles)
+        for array in (np.asarray(skeleton.offsets), *arrays):
+            of.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).tobytes())
+        return of.hexdigest()
 
     def posed(self, rotations: Float[np.ndarray, "J 3 3"], root: Float[np.ndarray, "3"]) -> "Skin":
         """The vertices in a pose, bound as before: linear blend skinning.
@@ -61,11 +76,16 @@ def make_skin(skeleton: Skeleton, surfaces: Sequence[Surface], most: int = MOST_
     """One mesh of all surfaces, with at most so many vertices; None without triangles.
 
     Vertices are merged in cells of a grid, as large as needed, where they belong to the same joint, face the same way
-    and have the same colour.
+    and have the same colour; where that leaves too many, of any colour, and then of any direction.
 
     Args:
         skeleton: whose joints they are bound to, with the surfaces at zero rotations.
+        most: up to 65536, the most that the page can have.
+
+    Raises:
+        InputError: there are more even so.
     """
+    most = min(most, _INDICES)
     starts = np.cumsum([0, *(len(surface.places) for surface in surfaces)])
     if not any(len(surface.triangles) for surface in surfaces):
         return None
@@ -86,32 +106,52 @@ def _at(skin: Skin, rows: Int[np.ndarray, " K"], triangles: Int[np.ndarray, "F 3
     return replace(skin, triangles=triangles, **{name: getattr(skin, name)[rows] for name in names})
 
 
-def _cells(skin: Skin, most: int) -> Int[np.ndarray, "V 7"]:
-    """Cells of vertices that are merged; there are at most so many."""
+def _cells(skin: Skin, most: int) -> Int[np.ndarray, "V K"]:
+    """Cells of vertices that are merged; there are at most so many.
+
+    Raises:
+        InputError: there are more, however large they are.
+    """
     owner = np.take_along_axis(skin.joints, skin.weights.argmax(axis=1)[:, None], axis=1)
-    facing = np.abs(skin.normals).argmax(axis=1)[:, None]
-    sign = np.take_along_axis(skin.normals, facing, axis=1) > 0
-    colour = np.round(skin.colours * 255).astype(int) @ np.array([1, 256, 65536])
-    same = np.hstack([owner, facing, sign, colour[:, None]])
-    low, high, found = 1e-4, 0.5, same
+    axis = np.abs(skin.normals).argmax(axis=1)[:, None]
+    facing = np.hstack([axis, np.take_along_axis(skin.normals, axis, axis=1) > 0])
+    colour = np.round(skin.colours * 255).astype(int) @ np.array([[1], [256], [65536]])
+    for same in ((owner, facing, colour), (owner, facing), (owner,)):
+        if (cells := _smallest_cells(skin.places, np.hstack(same), most)) is not None:
+            return cells
+    raise InputError(f"its mesh has too many parts for a page, which shows {most} vertices; export fewer objects.")
+
+
+def _smallest_cells(
+    places: Float[np.ndarray, "V 3"], same: Int[np.ndarray, "V C"], most: int
+) -> Int[np.ndarray, "V K"] | None:
+    """Cells of at most half a metre, apart where ``same`` differs; None where there are always more than ``most``."""
+    low, high = 1e-4, 0.5
+    divided = lambda edge: np.hstack([np.floor(places / edge).astype(int), same])  # noqa: E731
+    found = divided(high)
+    if len(np.unique(found, axis=0)) > most:
+        return None
     for _ in range(16):
         middle = float(np.sqrt(low * high))
-        cells = np.hstack([np.floor(skin.places / middle).astype(int), same])
+        cells = divided(middle)
         if len(np.unique(cells, axis=0)) > most:
             low = middle
         else:
             high, found = middle, cells
-    return found if found is not same else np.hstack([np.zeros((len(same), 3), int), same])
+    return found
 
 
-def _merged(skin: Skin, cells: Int[np.ndarray, "V 7"]) -> Skin:
+def _merged(skin: Skin, cells: Int[np.ndarray, "V K"]) -> Skin:
     _, first, group, count = np.unique(cells, axis=0, return_index=True, return_inverse=True, return_counts=True)
     group = group.reshape(-1)
     merged = _at(skin, first, _whole(group[skin.triangles]))
     mean = lambda values: np.stack(  # noqa: E731
         [np.bincount(group, values[:, axis], len(count)) / count for axis in range(3)], axis=1
     )
-    return replace(merged, places=mean(skin.places), normals=_unit(mean(skin.normals)))
+    normals = mean(skin.normals)
+    # Those of the two sides of a thin part may cancel out.
+    normals = np.where(np.linalg.norm(normals, axis=1, keepdims=True) > 1e-3, normals, merged.normals)
+    return replace(merged, places=mean(skin.places), normals=_unit(normals), colours=mean(skin.colours))
 
 
 def _whole(triangles: Int[np.ndarray, "F 3"]) -> Int[np.ndarray, "G 3"]:

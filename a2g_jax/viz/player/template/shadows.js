@@ -1,4 +1,4 @@
-// Shadows: the depth seen from the sun, and maps of the ground.
+// Shadows: the depth from the sun, and maps of the ground.
 
 const SUN = unit([-0.42, 1.1, 0.5]);
 const SHADOW_SIZE = [2048, 1024];
@@ -35,7 +35,7 @@ class Shadows {
     return cast;
   }
 
-  // Depth seen from the sun; a moving picture of software renderers uses a quarter of the map.
+  // Depth from the sun; a moving picture of software renderers uses a quarter of the map.
   depth(band, casters, coarse) {
     const { gl } = this, light = coarse ? multiply(QUARTER, this.sunMatrix(band)) : this.sunMatrix(band);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.depthTarget);
