@@ -35,6 +35,8 @@ class Benchmark(NamedTuple):
         return importlib.import_module(f"experiments.benchmarks.{self.module}").case(**self.settings)
 
 
+#: Contenders beside ours in the benchmarks that are not commands; not every benchmark has all of them.
+TWINS = ("torch_eager", "torch_compiled", "torch_authors", "torch_precomputed")
 _FLOW = {"name": "moglow"}
 BENCHMARKS: dict[str, Benchmark] = {
     "kinematics-22": Benchmark(

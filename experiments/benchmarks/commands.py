@@ -9,10 +9,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
-from statistics import median
+from statistics import mean, median
 from typing import Any, NamedTuple
+
+from experiments.benchmarks.measure import Stopwatch, usable_cores
+from experiments.benchmarks.turns import clock
 
 
 class Command(NamedTuple):
@@ -83,11 +86,16 @@ def _write_corpus(folder: Path) -> None:
     subprocess.run([sys.executable, "-m", "a2g_jax.cli", *arguments], cwd=folder, check=True, capture_output=True)
 
 
-def take_commands(name: str, names: list[str] | None, rounds: int) -> dict[str, Any]:
-    """Figures of every contender, in turns, after one round that fills caches."""
-    own = {key: one for key, one in commands(name).items() if names is None or key in names}
+def take_commands(name: str, without: Collection[str], rounds: int) -> dict[str, Any]:
+    """Figures of every contender, in turns, after one round that fills caches.
+
+    Args:
+        without: contenders to leave out; not ours.
+    """
+    own = {key: one for key, one in commands(name).items() if key not in without}
     rows: dict[str, dict[str, Any]] = {key: {"contender": key, "rounds": rounds} for key in own}
-    taken: dict[str, list[dict[str, float]]] = {key: [] for key in own}
+    taken: dict[str, list[dict[str, Any]]] = {key: [] for key in own}
+    which = clock(usable_cores())
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for prepare in {one.prepare for one in own.values() if one.prepare is not None}:
@@ -98,13 +106,15 @@ def take_commands(name: str, names: list[str] | None, rounds: int) -> dict[str, 
                 if number:
                     taken[key].append(turn)
     for key, turns in taken.items():
-        rows[key] |= {field: median(turn[field] for turn in turns) for field in turns[0]}
+        rows[key] |= {field: median(turn[field] for turn in turns) for field in ("wall_s", "cpu_s", "peak_mb")}
+        shares = [turn["others"] for turn in turns if turn["others"] is not None]
+        rows[key]["others_share"] = mean(shares) if shares else None
         ours = taken[next(iter(own))]
-        rows[key]["ratio"] = median(turn["cpu_s"] / mine["cpu_s"] for turn, mine in zip(turns, ours, strict=True))
+        rows[key]["ratio"] = median(turn[which] / mine[which] for turn, mine in zip(turns, ours, strict=True))
     return {"rows": list(rows.values()), "floor": {"seconds": 0.0}, "about": {}}
 
 
-def _run(command: Command, folder: Path) -> dict[str, float]:
+def _run(command: Command, folder: Path) -> dict[str, Any]:
     """Times and the largest process of a command that has to succeed."""
     import shutil
 
@@ -112,7 +122,7 @@ def _run(command: Command, folder: Path) -> dict[str, float]:
         shutil.rmtree(folder / name, ignore_errors=True)
     environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
-    start = time.perf_counter()
+    watch, start = Stopwatch(), time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, *command.arguments],
         cwd=folder,
@@ -125,8 +135,9 @@ def _run(command: Command, folder: Path) -> dict[str, float]:
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode != 0:
-        raise RuntimeError(f"{' '.join(command.arguments)}: {errors.decode().strip().splitlines()[-1]}")
-    return _figures(time.perf_counter() - start, usage)
+        last = (errors.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+        raise RuntimeError(f"{' '.join(command.arguments)}: {last}")
+    return {**_figures(time.perf_counter() - start, usage), "others": watch.others()}
 
 
 def _figures(wall: float, usage: resource.struct_rusage) -> dict[str, float]:

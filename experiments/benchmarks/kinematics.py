@@ -46,7 +46,8 @@ def _ours(skeleton: Any, pose: Any, upstream: Any) -> Call:
 def _theirs(skeleton: Any, pose: Any, upstream: Any, compiled: bool) -> Call:
     torch = load_torch()
     from a2g_jax.models.audio2gestures.config import PRESETS
-    from experiments.benchmarks.torch_twin import Twin, matrix_from_6d
+    from experiments.benchmarks.torch_rotations import matrix_from_6d
+    from experiments.benchmarks.torch_twin import Twin
 
     twin = Twin(PRESETS["paper"], skeleton, 1)
     values, gradient = torch.from_numpy(pose).requires_grad_(True), torch.from_numpy(upstream)

@@ -73,12 +73,19 @@ def _busy_seconds(cores: set[str]) -> float:
     return total / os.sysconf("SC_CLK_TCK")
 
 
+def _own_seconds() -> float:
+    """CPU seconds of this process and of its children that have ended."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
 class Stopwatch:
-    """Share of the cores that other processes took while it ran; ``None`` where Linux's /proc is missing."""
+    """Share of the cores that other processes, apart from children that have ended, took while it ran; ``None`` where
+    Linux's /proc is missing."""
 
     def __init__(self) -> None:
         self._linux = Path("/proc/stat").exists()
-        self._wall, self._own = time.perf_counter(), time.process_time()
+        self._wall, self._own = time.perf_counter(), _own_seconds()
         # The same ones at the end: libraries may put the process on others.
         self._cores = {f"cpu{core}" for core in os.sched_getaffinity(0)} if self._linux else set()
         self._busy = _busy_seconds(self._cores) if self._linux else 0.0
@@ -87,7 +94,7 @@ class Stopwatch:
         """Between 0 and 1."""
         if not self._linux:
             return None
-        wall, own = time.perf_counter() - self._wall, time.process_time() - self._own
+        wall, own = time.perf_counter() - self._wall, _own_seconds() - self._own
         busy = _busy_seconds(self._cores) - self._busy
         return max(0.0, busy - own) / (wall * len(self._cores))
 

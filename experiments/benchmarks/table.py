@@ -5,6 +5,10 @@ from typing import Any
 from experiments.benchmarks.catalogue import BENCHMARKS, Benchmark, Target
 from experiments.benchmarks.turns import clock
 
+#: Share of the cores above which other processes make a record's times worthless.
+MOST_OTHERS = 0.05
+#: Cell of a time that means nothing, since :func:`busy`.
+_BUSY = "busy"
 _HEADINGS = (
     "",
     "ours, s",
@@ -33,18 +37,30 @@ def table(records: dict[str, dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def busy(record: dict[str, Any]) -> bool:
+    """Whether the times of a record mean nothing: other processes took the cores, or a time is below its floor, whose
+    rates were then measured beside other work."""
+    floor, which = record["floor"]["seconds"], clock(record["threads"])
+    shares = [row.get("others_share") or 0.0 for row in record["rows"]]
+    times = [row[which] for row in record["rows"] if which in row]
+    return any(share > MOST_OTHERS for share in shares) or any(seconds < floor for seconds in times)
+
+
 def _cells(benchmark: Benchmark, record: dict[str, Any]) -> list[str]:
     rows = {row["contender"]: row for row in record["rows"]}
     ours = rows.get("a2g_jax", {})
     others = [rows.get(name, {}) for name in ("torch_eager", "torch_compiled", "torch_authors")]
     own, floor = ours.get(clock(record["threads"])), record["floor"]["seconds"]
-    return [
-        benchmark.title,
+    times = [
         _number(ours.get("wall_s")),
         _number(ours.get("cpu_s")),
         *map(_ratio, others),
         _number(floor) if floor else "-",
         _number(own / floor) if floor and own else "-",
+    ]
+    return [
+        benchmark.title,
+        *([_BUSY] * len(times) if busy(record) else times),
         _number(ours.get("peak_mb")),
         _number(others[0].get("peak_mb")),
         "; ".join(_judged(target, record, rows) for target in benchmark.targets) or "-",
@@ -61,6 +77,8 @@ def _judged(target: Target, record: dict[str, Any], rows: dict[str, Any]) -> str
         "megabytes": f"memory <= {target.value:g} MB",
         "speed": f">= {target.value:g}x real time",
     }
+    if target.kind in ("ratio", "floor", "speed") and busy(record):
+        return f"{names[target.kind]}: not measured: the cores were busy"
     if found is None:
         return f"{names[target.kind]}: not measured"
     met = found >= target.value if least else found <= target.value

@@ -10,7 +10,8 @@ from torch import Tensor
 
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
-from experiments.benchmarks.torch_twin import Noise, Twin, distance, geodesic_distance, kl, matrix_from_6d
+from experiments.benchmarks.torch_rotations import geodesic_distance, matrix_from_6d
+from experiments.benchmarks.torch_twin import Noise, Twin, distance, kl
 
 
 class AuthorsTwin(Twin):

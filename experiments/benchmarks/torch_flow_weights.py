@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from experiments.benchmarks import torch_twin
+from experiments.benchmarks import torch_params
 from experiments.benchmarks.torch_flow import Twin
 
 
@@ -75,7 +75,7 @@ def load_params(twin: Twin, params: Mapping[str, Any]) -> None:
     if set(params) != expected:
         raise ValueError(f"Expected the parameters {sorted(expected)}; got {sorted(params)}.")
     if twin.global_encoder is not None:
-        torch_twin.load_params(twin.global_encoder, params["global_encoder"])
+        torch_params.load_params(twin.global_encoder, params["global_encoder"])
 
     def copy(number: int, place: Any, array: Any, path: str) -> None:
         own, value = _of(place, place[0].detach()), np.asarray(array)
@@ -98,7 +98,7 @@ def gradients(twin: Twin) -> dict[str, Any]:
     steps = [_walk(_places(twin, number), None, gradient) for number in range(len(twin.steps))]
     tree = {"glow": _stacked(steps)}
     if twin.global_encoder is not None:
-        tree["global_encoder"] = torch_twin.gradients(twin.global_encoder)
+        tree["global_encoder"] = torch_params.gradients(twin.global_encoder)
     return tree
 
 

@@ -6,7 +6,7 @@ Gram-Schmidt, without our fallback for degenerate vectors (which costs us a litt
 so that parameters are copied and compared by name.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from experiments.benchmarks.torch_layers import (
     run_backbone,
     run_head,
 )
+from experiments.benchmarks.torch_rotations import geodesic_distance, matrix_from_6d
 from experiments.benchmarks.torch_similarity import lpips, ssim, stft_distance
 
 
@@ -87,27 +88,6 @@ class MappingNet(nn.Module):
         x = self.Conv1D_1(torch.relu(x))
         x = self.Conv1D_2(torch.relu(x))
         return run_head(self, 0, x)
-
-
-def matrix_from_6d(six: Tensor) -> Tensor:
-    """Gram-Schmidt of (..., 6) to (..., 3, 3)."""
-    first, second = six[..., :3], six[..., 3:]
-    first = first / first.norm(dim=-1, keepdim=True)
-    second = second - (first * second).sum(-1, keepdim=True) * first
-    second = second / second.norm(dim=-1, keepdim=True)
-    return torch.stack([first, second, torch.linalg.cross(first, second)], dim=-1)
-
-
-def geodesic_distance(first: Tensor, second: Tensor) -> Tensor:
-    """Angle between rotations (..., 3, 3), radians, with zero gradient where they are equal.
-
-    Sine and cosine of the angle from the rows, without forming the product of the matrices: the same numbers.
-    """
-    skew = torch.linalg.cross(first, second, dim=-1).sum(-2)
-    square = (skew * skew).sum(-1)
-    positive = square > torch.finfo(square.dtype).tiny
-    norm = torch.where(positive, torch.sqrt(torch.where(positive, square, 1.0)), 0.0)
-    return torch.atan2(norm / 2, ((first * second).sum((-1, -2)) - 1) / 2)
 
 
 class Noise(NamedTuple):
@@ -308,46 +288,3 @@ def distance(first: Tensor, second: Tensor) -> Tensor:
 def kl(code: Gaussian) -> Tensor:
     """KL divergence from the standard normal, summed over channels, a frame's average."""
     return 0.5 * (code.log_variance.exp() + code.mean**2 - 1.0 - code.log_variance).sum(1).mean()
-
-
-def _as_ours(value: Tensor) -> np.ndarray:
-    array = value.detach().cpu().numpy()
-    if array.ndim == 1:
-        return array
-    return array[:, :, 0].T if array.shape[2] == 1 else array.transpose(2, 1, 0)
-
-
-def load_params(module: nn.Module, params: Mapping[str, Any]) -> None:
-    """Copy a tree of our Flax parameters into a module whose parts have the same names.
-
-    Raises:
-        ValueError: a parameter is missing on either side, or has another shape.
-    """
-    own = dict(module.named_parameters(recurse=False))
-    parts = {name: part for name, part in module.named_children() if any(True for _ in part.parameters())}
-    if {*own, *parts} != set(params):
-        raise ValueError(f"Expected the parameters {sorted({*own, *parts})}; got {sorted(params)}.")
-    for name, value in own.items():
-        array = np.array(params[name])
-        if array.ndim == 2:
-            array = array[None]
-        if array.ndim == 3:
-            array = array.transpose(2, 1, 0)
-        if array.shape != tuple(value.shape):
-            raise ValueError(f"Expected {name} of shape {tuple(value.shape)}; got {array.shape}.")
-        with torch.no_grad():
-            value.copy_(torch.from_numpy(np.ascontiguousarray(array)))
-    for name, part in parts.items():
-        load_params(part, params[name])
-
-
-def gradients(module: nn.Module) -> dict[str, Any]:
-    """Gradients of all parameters as a tree shaped like our Flax parameters; zeros where there is none."""
-    tree: dict[str, Any] = {}
-    for path, value in module.named_parameters():
-        *folders, name = path.split(".")
-        place = tree
-        for folder in folders:
-            place = place.setdefault(folder, {})
-        place[name] = _as_ours(value.grad if value.grad is not None else torch.zeros_like(value))
-    return tree

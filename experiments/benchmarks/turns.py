@@ -82,7 +82,8 @@ def take_turns(case: Case, names: list[str], rounds: int) -> dict[str, Any]:
             ImportError,
             OSError,
         ) as error:  # a compiler that is missing, or does not know an operation
-            rows[name] = {"contender": name, "failed": f"{type(error).__name__}: {str(error).splitlines()[0]}"}
+            message = (str(error).splitlines() or ["no message"])[0]
+            rows[name] = {"contender": name, "failed": f"{type(error).__name__}: {message}"}
             continue
         calls[name] = call
         rows[name] = {"contender": name, "first_wall_s": first["wall_s"], "first_cpu_s": first["cpu_s"]}

@@ -312,6 +312,9 @@ def _digest(config: RunConfig, corpus: Corpus, generation: Mapping[str, Any] | N
     }
     if not sampling.get("rest_smoothing"):
         sampling = {name: value for name, value in sampling.items() if name not in ("rest_smoothing", "rest_speed")}
+    # Records from before this setting existed equal those with it off.
+    if not values["model_config"].get("recompute"):
+        values["model_config"].pop("recompute", None)
     if "style_controls" not in values["model_config"]:
         sampling.pop("control_curves", None)
     values["model_config"] |= sampling

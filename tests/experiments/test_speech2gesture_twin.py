@@ -18,7 +18,7 @@ from a2g_jax.training.state import joint_loss
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_speech2gesture")
-others = pytest.importorskip("experiments.benchmarks.torch_twin")
+others = pytest.importorskip("experiments.benchmarks.torch_rotations")
 
 PARENTS = (-1, 0, 0, 1)
 #: Frames that are no multiple of the stride and an odd number of bands show whether both sides pad alike.

@@ -223,3 +223,24 @@ def test_a_row_may_have_more_steps_than_its_table(toy_corpus):
     rows = {"plain": Variant({}), "longer": Variant({}, steps=1.5), "edited": Variant({}, trained_as="longer")}
     steps = {name: described(name, row, rows, 0, toy_corpus, where)[1].train_config.steps for name, row in rows.items()}
     assert steps == {"plain": 100, "longer": 150, "edited": 150}
+
+
+@pytest.mark.parametrize(
+    ("model", "changes", "expected"),
+    [
+        ("audio2gestures", {"rest_smoothing": 0}, "251aa93e077a34b8"),
+        ("stylized_flow", {}, "d93f90b3d1a73dd5"),
+        ("emotion_gesture", {}, "6cc56303545f63db"),
+    ],
+)
+def test_settings_that_are_off_leave_stored_records_valid(toy_corpus, model, changes, expected):
+    """The digests of commit e2a0cd8: a new setting must not enter them while it is off."""
+    where = Setting(toy_corpus.path, None, Path("runs"), 100, 2, (0,), 1.0)
+    assert described("plain", Variant(changes, model=model), {}, 0, toy_corpus, where)[0] == expected
+
+
+def test_a_setting_that_is_on_has_another_digest(toy_corpus):
+    where = Setting(toy_corpus.path, None, Path("runs"), 100, 2, (0,), 1.0)
+    rows = [Variant({"recompute": on}, model="stylized_flow") for on in (False, True)]
+    off, on = (described("plain", row, {}, 0, toy_corpus, where)[0] for row in rows)
+    assert off != on

@@ -24,6 +24,7 @@ from a2g_jax.training.state import joint_loss
 
 torch = pytest.importorskip("torch")
 twins = pytest.importorskip("experiments.benchmarks.torch_twin")
+weights = pytest.importorskip("experiments.benchmarks.torch_params")
 layers = pytest.importorskip("experiments.benchmarks.torch_layers")
 
 #: A small tree with forks: the compiler, not the sums, takes this test's time.
@@ -65,7 +66,7 @@ def _setting(dtype, config=CONFIG):
     if config.lpips_weight > 0:
         eyes = jax.tree.map(lambda p: jnp.asarray(p, dtype), build_autoencoder(EYES, data).init(jax.random.key(8)))
         network = layers.TCN(6 * JOINTS, EYES.encoder_channels, EYES.kernel_size)
-        twins.load_params(network, eyes["encoder"])
+        weights.load_params(network, eyes["encoder"])
         data = data._replace(perceptual=lambda pose, data=data: encode(EYES, data, eyes, pose))
         features = network.blocks
     params = jax.tree.map(lambda p: jnp.asarray(p, dtype), Codec(config, data).init(jax.random.key(5)))
@@ -77,7 +78,7 @@ def _setting(dtype, config=CONFIG):
         jnp.asarray(pose, dtype),
     )
     twin = twins.Twin(config, skeleton, BANDS, features).to(getattr(torch, np.dtype(dtype).name))
-    twins.load_params(twin, params)
+    weights.load_params(twin, params)
     return data, params, batch, jax.random.key(11), twin
 
 
@@ -155,7 +156,7 @@ def _compare(dtype, tolerance, config=CONFIG):
         twin.zero_grad()
         theirs[name].backward(retain_graph=True)
         gradient = jax.tree.map(lambda g, i=number: g[i], ours_gradients)
-        expected = twins.gradients(twin)
+        expected = weights.gradients(twin)
         largest = max(np.abs(leaf).max() for leaf in jax.tree.leaves(expected))
         assert largest > 0, name
         jax.tree.map(
@@ -207,8 +208,8 @@ def test_loss_weights_agree():
 def test_load_params_refuses_other_networks():
     _, params, _, _, twin = _setting(np.float32)
     with pytest.raises(ValueError, match="Expected the parameters"):
-        twins.load_params(twin, {name: params[name] for name in ("audio_encoder", "decoder", "mapping_net")})
+        weights.load_params(twin, {name: params[name] for name in ("audio_encoder", "decoder", "mapping_net")})
     narrow = {"kernel": np.zeros((3, 4, 5)), "bias": np.zeros(4)}
     wrong = {**params, "mapping_net": {**params["mapping_net"], "Conv1D_0": narrow}}
     with pytest.raises(ValueError, match="of shape"):
-        twins.load_params(twin, wrong)
+        weights.load_params(twin, wrong)

@@ -62,6 +62,17 @@ def test_windows_leave_no_seam(generator):
     np.testing.assert_allclose(windowed.rotations, whole.rotations, atol=1e-5)
 
 
+def test_short_speech_has_the_same_motion_in_a_short_window(generator):
+    """Bit for bit, whether the window has 256 frames or 1024."""
+    speech, (short, long) = _SPEECH[: 3 * 16000], (Generator(generator.run) for _ in range(2))
+    long.engine.model = long.engine.model._replace(fixed_window=True)
+    assert [one.engine.window_of(90) for one in (short, long)] == [256, 1024]
+    ours, expected = (one.generate(speech, 2, seed=5) for one in (short, long))
+    for motion, other in zip(ours, expected, strict=True):
+        np.testing.assert_array_equal(motion.rotations, other.rotations)
+        np.testing.assert_array_equal(motion.root, other.root)
+
+
 def test_short_speech_is_made_in_a_short_window(generator):
     engine = Generator(generator.run).engine
     assert [engine.window_of(frames) for frames in (1, 90, 256, 257, 1024, 5000)] == [256, 256, 256, 512, 1024, 1024]
