@@ -112,9 +112,9 @@ def _run(jobs: Sequence[Job], work: Path, at_once: int, running: list[Running]) 
 
 
 def _stop(running: Sequence[Running]) -> None:
-    """Interrupt what runs, and wait until its checkpoints are written."""
+    """End what runs, and wait until its checkpoints are written; shells may have their children ignore SIGINT."""
     for one in running:
-        one.process.send_signal(signal.SIGINT)
+        one.process.terminate()
     for one in running:
         one.process.wait()
         one.log.close()
