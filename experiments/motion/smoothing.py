@@ -54,7 +54,7 @@ def main() -> None:
     truth = [[speech.truth] for speech in speeches if speech.truth is not None]
     run = demo_run()
     reference = statistics(speeches, truth)
-    own = " | ".join(f"{reference[key].mean:.3g}" for key in KEYS)
+    own = " | ".join(f"{reference[key]['value']:.3g}" for key in KEYS)
     lines = [
         "# Smoothing of quiet frames",
         "",
@@ -70,7 +70,7 @@ def main() -> None:
             generator = Generator(replace(run, config=run.config.with_sampling(**sampling)))
             made = [generator.generate(speech.audio, 1, 7919 * (n + 1)) for n, speech in enumerate(speeches)]
             found = statistics(speeches, made)
-            cells = [f"{found[key].mean / reference[key].mean:.2f}" for key in KEYS]
+            cells = [f"{found[key]['value'] / reference[key]['value']:.2f}" for key in KEYS]
             lines.append(f"| {passes} | {speed:g} | {' | '.join(cells)} | {100 * stutters(_flat(made)):.1f} |")
             bar.update()
     text = "\n".join(lines) + "\n"
