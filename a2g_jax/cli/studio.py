@@ -182,8 +182,9 @@ def generate_take(arguments: Sequence[str], folder: Path, job: "Job", opened: "R
         order="best",
     )
     write_audio(folder / SPEECH, ready.audio, rate)
-    skeleton = read_motion_npz(folder / "sample_00.npz").skeleton
-    skin = ready.delivery.skin(skeleton)  # before the lines, which say what cannot be read of it
+    skin = None
+    if ready.delivery.character is not None:  # before the lines, which say what cannot be read of it
+        skin = ready.delivery.skin(read_motion_npz(folder / "sample_00.npz").skeleton)
     described = [describe_findings(report.findings, ready.run.config.fps) for report in checked.reports]
     return Outcome(
         seconds=len(ready.audio) / rate,

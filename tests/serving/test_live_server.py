@@ -21,6 +21,7 @@ from a2g_jax.serving.live.drawn import Drawn
 from a2g_jax.serving.live.protocol import frames_binary, quaternions, read_binary
 from a2g_jax.serving.live.session import Pace
 from a2g_jax.viz.player.shape import build_shape
+from a2g_jax.viz.player.skin import bind
 from a2g_jax.viz.player.stage import shape_points
 from experiments.characters.rigs import unreal
 from experiments.characters.skinned import mixamo_glb
@@ -161,12 +162,15 @@ def test_frames_of_a_character_are_those_of_its_file(live, motion, kind, tmp_pat
     whole = delivery.make(motion)
     encode = drawn.encoded(frames_binary)
     width = 3 + 4 * whole.own.skeleton.joints
+    skin = delivery.skin(whole.shown.skeleton)
+    assert (skin is None) == (kind == "bvh")
+    shape = build_shape(whole.shown.skeleton) if skin is None else bind(skin).shape()
     for first in range(0, motion.frames - 3, 7):
         rows = read_binary(encode(motion.clip(first, first + 3), first), width)[1]
         expected = read_binary(frames_binary(whole.own.clip(first, first + 3), first), width)[1]
         np.testing.assert_allclose(rows, expected, atol=1e-5)
         points = read_binary(drawn.points(motion.clip(first, first + 3), first), 3 * drawn.figure()["points"])[1]
-        shown = shape_points(whole.shown, build_shape(whole.shown.skeleton))[first : first + 3]
+        shown = shape_points(whole.shown, shape)[first : first + 3]
         np.testing.assert_allclose(points, shown.reshape(3, -1), atol=1e-4)
 
 
