@@ -4,6 +4,7 @@ import errno
 import logging
 import os
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,8 @@ from a2g_jax.training.state import TrainState
 
 #: Beginnings of the names of folders that are being written and removed.
 _SAVING, _REMOVED = "saving-", "removed-"
+#: After a failed save: seconds without new files after which Orbax's threads count as stopped, and the longest wait.
+_QUIET, _STOPPING = 0.5, 10.0
 
 
 class Checkpoints:
@@ -64,7 +67,7 @@ class Checkpoints:
             write_list(saving, path)
             saving.rename(path)
         except Exception as error:
-            sweep_unfinished(self.folder)
+            _sweep_failed(self.folder)
             if not disk_full(error):
                 raise
             last = max(self.steps(), default=None)
@@ -139,12 +142,32 @@ def _names(path: Path) -> set[str]:
 
 def sweep_unfinished(folder: Path) -> None:
     """Remove what a killed or failed save left; nobody else may save there meanwhile."""
-    if folder.is_dir():
-        for path in folder.iterdir():
-            if path.is_dir() and not path.name.isdigit():
-                shutil.rmtree(path, ignore_errors=True)
-            elif path.suffix == ".json" and not path.with_suffix("").is_dir():
-                path.unlink(missing_ok=True)
+    for path in _unfinished(folder):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _unfinished(folder: Path) -> list[Path]:
+    """Folders without the name of a checkpoint, and lists of files without a checkpoint."""
+    if not folder.is_dir():
+        return []
+    return [
+        path
+        for path in folder.iterdir()
+        if (not path.name.isdigit() if path.is_dir() else path.suffix == ".json" and not path.with_suffix("").is_dir())
+    ]
+
+
+def _sweep_failed(folder: Path) -> None:
+    """Remove what a failed save left. Orbax raises its first error while other threads still write their files."""
+    began = written = time.monotonic()
+    while (now := time.monotonic()) < min(written + _QUIET, began + _STOPPING):
+        if _unfinished(folder):
+            written = now
+            sweep_unfinished(folder)
+        time.sleep(_QUIET / 20)
 
 
 def _check_space(folder: Path, state: TrainState) -> None:

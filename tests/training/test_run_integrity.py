@@ -2,11 +2,14 @@
 
 import contextlib
 import dataclasses
+import errno
 import json
 import os
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import jax
@@ -199,6 +202,23 @@ def test_a_full_disk_keeps_the_checkpoints_there_are(checkpoints, size):
     assert int(checkpoints.restore(state(0)).step) == 30
     checkpoints.save(state(40))
     assert names(checkpoints.folder) == ["30", "30.json", "40", "40.json"]
+
+
+def test_what_threads_write_after_a_failed_save_is_removed(checkpoints, monkeypatch):
+    def write(path):
+        for number in range(20):
+            with contextlib.suppress(FileNotFoundError):  # removed meanwhile
+                (path / "part" / str(number)).mkdir(parents=True)
+            time.sleep(0.02)
+
+    def fails(path, tree):
+        threading.Thread(target=write, args=(Path(path),)).start()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("a2g_jax.training.checkpoint.ocp.save", fails)
+    with pytest.raises(OutputError, match="checkpoints/40: cannot be written"):
+        checkpoints.save(state(40))
+    assert names(checkpoints.folder) == ["20", "20.json", "30", "30.json"]
 
 
 def test_a_disk_without_room_is_found_before_writing(checkpoints, monkeypatch):
