@@ -211,13 +211,17 @@ def test_what_threads_write_after_a_failed_save_is_removed(checkpoints, monkeypa
                 (path / "part" / str(number)).mkdir(parents=True)
             time.sleep(0.02)
 
+    writers = []
+
     def fails(path, tree):
-        threading.Thread(target=write, args=(Path(path),)).start()
+        writers.append(threading.Thread(target=write, args=(Path(path),)))
+        writers[0].start()
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr("a2g_jax.training.checkpoint.ocp.save", fails)
     with pytest.raises(OutputError, match="checkpoints/40: cannot be written"):
         checkpoints.save(state(40))
+    writers[0].join()
     assert names(checkpoints.folder) == ["20", "20.json", "30", "30.json"]
 
 
