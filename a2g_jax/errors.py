@@ -39,7 +39,7 @@ class OutputError(InputError):
 
 
 class InputWarning(UserWarning):
-    """A file that can be used, with a doubt; the command line prints one as a single line and goes on."""
+    """A file that can be used, with a doubt; the command line prints one as a single line and continues."""
 
 
 def brief(value: object, longest: int = 80) -> str:

@@ -85,7 +85,7 @@ class Generator:
         """Refuse sampling settings that do not fit an audio, before any work.
 
         Raises:
-            InputError: such as a timeline that goes on after its end.
+            InputError: such as a timeline with times after its end.
         """
         check_ends(self.engine.lines, self.frames(audio), self.run.config.fps)
         if self.engine.model.requested is not None:

@@ -255,7 +255,7 @@ def start_script(text: str):
     return subprocess.Popen([sys.executable, "-c", text], stderr=subprocess.PIPE)
 
 
-def test_killed_it_goes_on(tmp_path, whole):
+def test_resumes_after_a_kill(tmp_path, whole):
     path = tmp_path / "corpus"
     text = textwrap.dedent(_SCRIPT).format(tests=str(Path(__file__).parent), path=str(path), pause=0.05)
     assert kill_until_done(lambda: start_script(text), path, np.random.default_rng(1), 2, 0.4) > 0
@@ -264,7 +264,7 @@ def test_killed_it_goes_on(tmp_path, whole):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_killed_many_times_it_goes_on(tmp_path, whole):
+def test_resumes_after_many_kills(tmp_path, whole):
     """Every stage is hit, the last steps too: there the rows come without a pause."""
     rng = np.random.default_rng(2)
     for number in range(20):

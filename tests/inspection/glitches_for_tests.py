@@ -25,7 +25,7 @@ def jump(motion: Motion, frame: int) -> tuple[Motion, slice]:
 
 
 def frozen(motion: Motion, frame: int) -> tuple[Motion, slice]:
-    """A second that stands still, after which the motion goes on where it would be."""
+    """A second that stands still, after which the motion continues where it would be."""
     rotations, stop = np.array(motion.rotations), frame + round(motion.fps)
     rotations[frame:stop] = rotations[frame]
     return replace(motion, rotations=rotations), slice(frame + 1, stop + 1)

@@ -107,7 +107,7 @@ def continued(earlier, last, new, frames):
 
 
 def test_a_seam_has_no_step_of_place_or_speed():
-    """A chunk that jumps away from the poses before it; and one that goes on as they do is left as it is."""
+    """A chunk that jumps away from the poses before it; and one that continues them is left as it is."""
     time = np.arange(40)[:, None] / 15.0
     whole = np.concatenate([np.sin(3 * time), np.cos(2 * time)], axis=1).astype(np.float32)
     joining = jax.jit(seam, static_argnums=2)

@@ -51,7 +51,7 @@ def test_reverse_reads_backwards(layer, back):
 
 
 @pytest.mark.parametrize("layer", [GRU(H), LSTM(H)], ids=["gru", "lstm"])
-def test_goes_on_from_a_state(layer):
+def test_continues_from_a_state(layer):
     params, x = layer_and_input(layer)
     whole, last = layer.apply(params, x)
     first, state = layer.apply(params, x[:, :3])

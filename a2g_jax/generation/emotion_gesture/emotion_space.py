@@ -107,6 +107,6 @@ class EmotionSpace:
             emotion: as ``--emotion``: an emotion, a blend, or a timeline such as ``neutral@0,anger@12.5``.
 
         Raises:
-            InputError: an emotion that the run does not have, or a timeline that goes on after the last frame.
+            InputError: an emotion that the run does not have, or a timeline with times after the last frame.
         """
         return emotion_rows(parse_timeline(emotion), self.emotions, frames, self._run.config.fps, emotion)

@@ -11,9 +11,9 @@ from a2g_jax.geometry.skeleton import Skeleton
 
 
 def neck_and_head(skeleton: Skeleton, roles: Mapping[str, int]) -> dict[str, int]:
-    """``Neck`` and ``Head`` above the fork of the arms, where none is named so and spines go on there; else nothing.
+    """``Neck`` and ``Head`` above the fork of the arms, where none has the name and the spine continues there.
 
-    Of two or more such joints the last is the head, and the others are the neck.
+    Empty elsewhere. Of two or more such joints the last is the head, and the others are the neck.
 
     Args:
         roles: joints by part, with both shoulders.

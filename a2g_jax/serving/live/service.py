@@ -88,7 +88,7 @@ class Service:
         key = json.dumps([frames, sorted(changes.items())])
         if key == self._own:  # never dropped, and does not wait for what other clients compile
             return await self.compute(self.default.restarted, hello.seed, hello.sample_rate)
-        # One at a time: compiling takes all cores for seconds. Others go on meanwhile, in their own threads.
+        # One at a time: compiling takes all cores for seconds. Others continue meanwhile, in their own threads.
         async with self._compiling:
             if key not in self._programs:
                 made = asyncio.get_running_loop().run_in_executor(self._compiler, self._compiled, lookahead, changes)

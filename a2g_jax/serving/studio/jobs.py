@@ -50,7 +50,7 @@ class Job:
     _changed: Callable[[], None] = lambda: None
 
     def step(self, done: int = 0, total: int = 0, unit: str = "") -> None:
-        """Report steps; 0 of 0 only asks whether to go on.
+        """Report steps; 0 of 0 only checks for a cancellation.
 
         Raises:
             Cancelled: the job is to end.
