@@ -92,7 +92,7 @@ def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path,
     taken = {}
 
     class Still(Generator):
-        def __init__(self, run):
+        def __init__(self, run, like=None):
             taken[run.config.model] = getattr(run.config.sampling_settings, "controls", None)
             self.run = run
 
