@@ -13,8 +13,9 @@ import numpy as np
 
 from a2g_jax import __version__
 from a2g_jax.data.body_json import body_to_json
-from a2g_jax.data.corpus import Corpus, fingerprint_of
+from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.corpus_layout import ARRAYS, FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
+from a2g_jax.data.corpus_manifest import fingerprint_of
 from a2g_jax.data.featurise import Prepared as Prepared
 from a2g_jax.data.featurise import Skipped as Skipped
 from a2g_jax.data.featurise import prepare_recording as prepare_recording
