@@ -20,7 +20,8 @@ from a2g_jax.evaluation.evaluate import check_runs, evaluate
 from a2g_jax.evaluation.feature_network import check_separate, load_feature_network, vectors_of
 from a2g_jax.evaluation.report import BASELINES, HALVES, MOTIONS, check_comparable, latex, markdown, merge, write_report
 from a2g_jax.evaluation.scores import Metric, Scorer, Target
-from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.rotation import axis_angle_from_matrix
 from a2g_jax.metrics.pointwise import wrist_to_wrist
 from a2g_jax.models import find_model

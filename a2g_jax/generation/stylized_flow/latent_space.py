@@ -19,7 +19,7 @@ from a2g_jax.generation.stylized_flow.requests import matching_requests
 from a2g_jax.generation.stylized_flow.seam import continued
 from a2g_jax.generation.stylized_flow.style import Style, drive, within_training
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.metrics.style import HandStyle
