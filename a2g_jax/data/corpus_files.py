@@ -1,16 +1,25 @@
-"""The small files of a corpus, each compared with its hash in the manifest when it is read."""
+"""The small files of a corpus, compared with their hashes in the manifest when they are read."""
 
 import hashlib
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from a2g_jax.data.corpus_layout import MANIFEST
+import numpy as np
+
+from a2g_jax.data.corpus_layout import ARRAYS, MANIFEST, Entry
+from a2g_jax.data.splits import Splits
 from a2g_jax.errors import InputError
-from a2g_jax.features.statistics import Statistics
+from a2g_jax.features.statistics import RunningStatistics, Statistics
 from a2g_jax.io.files import check_readable, parse_json
 from a2g_jax.io.untrusted import Limits
 from a2g_jax.io.untrusted.numpy_files import read_npz_file
+
+#: Lower bounds on standard deviations, which are used as divisors.
+_FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
+#: Rows read at once for the statistics.
+_ROWS = 65536
 
 
 def read_json_file(path: Path, expected: str | None) -> Any:
@@ -41,6 +50,22 @@ def read_statistics(path: Path, expected: str | None) -> dict[str, Statistics]:
         reason = str(error).removeprefix(f"{path}").lstrip(":, ").rstrip(".")
         raise InputError(f"{path}: cannot be read ({reason}); prepare the corpus anew.") from None
     return {name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"]) for name in names}
+
+
+def write_statistics(folder: Path, entries: Sequence[Entry], splits: Splits) -> None:
+    """Write means and standard deviations of a corpus's arrays over its training split only."""
+    values: dict[str, Any] = {}
+    for name in ARRAYS:
+        key = name.removesuffix(".npy")
+        array = np.load(folder / name, mmap_mode="r", allow_pickle=False)
+        running = RunningStatistics()
+        for recording, start, stop in splits["train"]:
+            first = entries[recording].first
+            for row in range(first + start, first + stop, _ROWS):
+                running.add(array[row : min(row + _ROWS, first + stop)])
+        statistics = running.result(_FLOORS[key])
+        values[f"{key}_mean"], values[f"{key}_std"] = statistics.mean, statistics.std
+    np.savez(folder / "statistics.npz", **values)
 
 
 def differs(path: Path) -> str:
