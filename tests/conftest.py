@@ -29,10 +29,13 @@ _HOOK = install_import_hook("a2g_jax", "beartype.beartype")
 # Tracing makes many small objects beside a large heap: at Python's thresholds, a third of it is the search for cycles.
 gc.set_threshold(20_000, 10, 10)
 
-#: Memory of a worker, bytes, from which compiled programs are dropped: with all of the suite it would pass 5 GB.
-_MOST_MEMORY = 2.5e9
+#: Memory of a worker, bytes, up to which compiled programs are always kept, and from which they are always dropped; in
+#: between, where it is more than the worker's part of half of what was free.
+_KEPT, _DROPPED = 2.5e9, 6e9
 #: What it may grow by until they are dropped again, where the allocator keeps the memory of dropped programs.
 _GROWTH = 0.5e9
+#: Mapped regions from which they are dropped as well: programs have several each, and Linux allows 65 530.
+_MOST_REGIONS = 50_000
 
 
 def _resident() -> float:
@@ -41,10 +44,20 @@ def _resident() -> float:
     return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") if statm.exists() else 0.0
 
 
+def _regions() -> int:
+    """Mapped regions of this process; zero where the system does not list them."""
+    maps = Path("/proc/self/maps")
+    return len(maps.read_bytes().splitlines()) if maps.exists() else 0
+
+
 @pytest.fixture(scope="session")
 def memory_limit():
     """Memory at which programs are dropped next; one number in a list, as it rises."""
-    return [_MOST_MEMORY]
+    free = 0.0
+    if (info := Path("/proc/meminfo")).exists():
+        free = 1024.0 * int(info.read_text().split("MemAvailable:")[1].split()[0])
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
+    return [min(max(_KEPT, free / (2 * workers)), _DROPPED)]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -54,12 +67,12 @@ def bounded_memory(memory_limit):
     To drop them is dear: the modules after it compile anew what they share, and the search for cycles takes a second.
     """
     yield
-    if _resident() > memory_limit[0]:
+    if _resident() > memory_limit[0] or (_resident() > _KEPT and _regions() > _MOST_REGIONS):
         jax.clear_caches()
         gc.collect()
         with contextlib.suppress(OSError, AttributeError):  # not glibc
             ctypes.CDLL(None).malloc_trim(0)
-        memory_limit[0] = max(_MOST_MEMORY, _resident() + _GROWTH)
+        memory_limit[0] = max(memory_limit[0], _resident() + _GROWTH)
 
 
 @pytest.fixture

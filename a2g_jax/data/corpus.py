@@ -1,7 +1,5 @@
 """A prepared corpus on disk: features and motion at the same frame times."""
 
-import hashlib
-import io
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,36 +10,20 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int16, Int32, Int64
 
-from a2g_jax.data.body_json import body_from_json
-from a2g_jax.data.corpus_layout import (
-    ANNOTATIONS,
-    FORMAT,
-    MANIFEST,
-    PARTS,
-    SHARD,
-    VERSION,
-    VERSION_ON_DEMAND,
-    WAVEFORM,
-    Entry,
-)
+from a2g_jax.data.corpus_files import read_json_file, read_statistics
+from a2g_jax.data.corpus_layout import ANNOTATIONS, PARTS, WAVEFORM, Entry
+from a2g_jax.data.corpus_manifest import read_manifest
 from a2g_jax.data.frame_labels import label_rows, word_rows
 from a2g_jax.data.scaled_waveform import ScaledWaveform
 from a2g_jax.data.splits import Segment, Splits
-from a2g_jax.errors import InputError, brief
+from a2g_jax.errors import InputError
 from a2g_jax.features.mel import MelConfig
 from a2g_jax.features.statistics import Statistics
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS, PoseSpace
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.skeleton import Skeleton
-from a2g_jax.io.files import check_readable, parse_json
-from a2g_jax.io.sealed import read_sealed
 from a2g_jax.io.stored_array import StoredArray
-from a2g_jax.io.untrusted import Limits
-from a2g_jax.io.untrusted.numpy_files import read_npz_file
-
-#: Entries of manifests that have a checksum.
-SEALED_WITH = ("annotations",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,81 +56,12 @@ class Corpus:
             InputError: not a corpus, a damaged one, or one of a later version.
         """
         path = Path(path)
-        if (path / SHARD).is_file():
-            raise InputError(f"{path}: is one shard of a corpus; merge all of them with 'a2g prepare --merge'.")
-        if not (path / MANIFEST).is_file():
-            raise InputError(f"{path}: is not a corpus (no {MANIFEST} in it); make one with 'a2g prepare'.")
-        manifest = read_sealed(path / MANIFEST, SEALED_WITH)
-        if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-            raise InputError(f"{path / MANIFEST}: is not the manifest of a corpus; make one with 'a2g prepare'.")
-        if manifest.get("version") not in (VERSION, VERSION_ON_DEMAND):
-            raise InputError(
-                f"{path / MANIFEST}: has version {brief(manifest.get('version'))}; expected {VERSION} or"
-                f" {VERSION_ON_DEMAND}; prepare it anew."
-            )
-        kind = str(manifest.get("pose", "6d"))
-        if kind not in WIDTHS:
-            raise InputError(
-                f"{path / MANIFEST}: has poses of the unknown kind {brief(repr(kind))}; the kinds are"
-                f" {', '.join(WIDTHS)}."
-            )
-        try:
-            corpus = cls(
-                path=path,
-                fps=float(manifest["fps"]),
-                mel=MelConfig(**manifest["mel"]),
-                space=PoseSpace(body_from_json(manifest), kind),
-                recordings=tuple(Entry(**entry) for entry in manifest["recordings"]),
-                splits={name: [Segment(*row) for row in rows] for name, rows in manifest["splits"].items()},
-                recipe=manifest["recipe"],
-                fingerprint=manifest["fingerprint"],
-                on_demand=manifest["version"] == VERSION_ON_DEMAND,
-                hashes=manifest.get("arrays", {}),
-                annotation_hashes=tuple(manifest.get("annotations", ())),
-            )
-            corpus._check_types()
-            if corpus.hashes and fingerprint_of(corpus.hashes) != corpus.fingerprint:
-                raise ValueError("fingerprint and hashes disagree")
-            if len(corpus.annotation_hashes) not in (0, len(corpus.recordings)):
-                raise ValueError(f"{len(corpus.annotation_hashes)} hashes of annotations")
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"{path / MANIFEST}: is damaged ({brief(repr(error), 160)}); prepare the corpus anew."
-            ) from None
+        corpus = cls(path=path, **read_manifest(path))
         corpus._check()
         return corpus
 
-    def _check_types(self) -> None:
-        """Check the types of values that other programs may have written.
-
-        Raises:
-            TypeError: another type.
-        """
-        for entry in self.recordings:
-            texts = (entry.name, entry.speaker, entry.emotion, entry.split)
-            numbers = (entry.first, entry.frames, entry.first_sample, entry.samples)
-            if not (all(isinstance(one, str) for one in texts) and isinstance(entry.sources, dict)):
-                raise TypeError(f"recording {brief(entry.name)}")
-            if any(type(one) is not int or one < 0 for one in numbers):
-                raise TypeError(f"frames or samples of recording {brief(entry.name)}")
-        if any(type(one) is not int for rows in self.splits.values() for row in rows for one in row):
-            raise TypeError("a split")
-        digests = (*self.hashes.values(), *self.annotation_hashes, self.fingerprint)
-        if not (isinstance(self.recipe, dict) and all(isinstance(one, str) for one in digests)):
-            raise TypeError("recipe or hashes")
-
     def _check(self) -> None:
-        """Check shapes and bounds, so that nothing fails in the middle of a training."""
-        where = self.path / MANIFEST
-        if not 0 < self.fps < 10_000:
-            raise InputError(f"{where}: is damaged (fps is {self.fps}); prepare the corpus anew.")
-        for entry in self.recordings:
-            if not (isinstance(entry.waveform_gain, int | float) and 0 < entry.waveform_gain < 2**200):
-                raise InputError(f"{where}: is damaged (waveform_gain is {entry.waveform_gain}); prepare it anew.")
-        for name, segments in self.splits.items():
-            for index, start, stop in segments:
-                if not (0 <= index < len(self.recordings) and 0 <= start < stop <= self.recordings[index].frames):
-                    raise InputError(f"{where}: is damaged ({name} holds {[index, start, stop]}); prepare it anew.")
+        """Check the shapes of the arrays, so that nothing fails in the middle of a training."""
         shapes = {"audio": (self.mel.width,), "pose": self.space.shape, "root": (3,)}
         for name, statistics in self.statistics.items():
             if not statistics.mean.shape == statistics.std.shape == shapes[name] or not np.all(statistics.std > 0):
@@ -173,21 +86,10 @@ class Corpus:
         if not (parts and all(isinstance(roles, list) and roles for roles in parts) and self.later.get("stored")):
             raise InputError(f"{self.path / PARTS}: is damaged; prepare the corpus anew.")
 
-    def _bytes(self, name: str, expected: str | None) -> bytes:
-        """The content of a small file, compared with its hash if there is one."""
-        path = check_readable(self.path / name, "a file of a corpus")
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror}); check the disk.") from None
-        if expected is not None and hashlib.sha256(data).hexdigest() != expected:
-            raise InputError(differs(path))
-        return data
-
     @cached_property
     def later(self) -> dict[str, Any]:
         """Recipes of recordings that are generated in training (:mod:`a2g_jax.data.on_demand`); else empty."""
-        return parse_json(self._bytes(PARTS, self.hashes.get(PARTS)), self.path / PARTS) if self.on_demand else {}
+        return read_json_file(self.path / PARTS, self.hashes.get(PARTS)) if self.on_demand else {}
 
     @property
     def body(self) -> Skeleton | PoseLayout:
@@ -349,17 +251,8 @@ class Corpus:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """``audio`` (width,), ``pose`` (R, D) and ``root`` (3,), over the training split only."""
-        path, names = self.path / "statistics.npz", ("audio", "pose", "root")
-        try:
-            data = self._bytes(path.name, self.hashes.get(path.name))
-            keys = [f"{name}_{part}" for name in names for part in ("mean", "std")]
-            arrays = read_npz_file(io.BytesIO(data), str(path), keys, limits=Limits(size=2**26))
-        except InputError as error:
-            if str(error) == differs(path):
-                raise
-            reason = str(error).removeprefix(f"{path}").lstrip(":, ").rstrip(".")
-            raise InputError(f"{path}: cannot be read ({reason}); prepare the corpus anew.") from None
-        return {name: Statistics(arrays[f"{name}_mean"], arrays[f"{name}_std"]) for name in names}
+        path = self.path / "statistics.npz"
+        return read_statistics(path, self.hashes.get(path.name))
 
     def segments(self, split: str) -> list[Segment]:
         """The stretches of a split, as rows of the arrays.
@@ -386,20 +279,6 @@ class Corpus:
 
     def annotations(self, recording: int) -> dict[str, Any]:
         """Words and other annotations of a recording; times in seconds."""
-        name = f"{ANNOTATIONS}/{recording:05d}.json"
         expected = self.annotation_hashes[recording] if self.annotation_hashes else None
-        found: dict[str, Any] = parse_json(self._bytes(name, expected), self.path / name)
+        found: dict[str, Any] = read_json_file(self.path / ANNOTATIONS / f"{recording:05d}.json", expected)
         return found
-
-
-def differs(path: Path) -> str:
-    """The message for a file whose content is not that of its hash."""
-    return (
-        f"{path}: differs from its hash in {MANIFEST}: it was damaged or changed; copy the corpus again, or prepare it"
-        " anew."
-    )
-
-
-def fingerprint_of(hashes: Mapping[str, str]) -> str:
-    """The fingerprint of a corpus from the hashes of its files."""
-    return hashlib.sha256("".join(hashes.values()).encode()).hexdigest()

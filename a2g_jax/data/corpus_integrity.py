@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from a2g_jax.data.corpus import Corpus, differs
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_files import differs
 from a2g_jax.data.corpus_layout import ANNOTATIONS, WAVEFORM
 from a2g_jax.errors import InputError
 from a2g_jax.io.hashes import cached_scans, sha256_blocks

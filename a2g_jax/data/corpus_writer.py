@@ -9,29 +9,24 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from a2g_jax import __version__
 from a2g_jax.data.body_json import body_to_json
-from a2g_jax.data.corpus import Corpus, fingerprint_of
-from a2g_jax.data.corpus_layout import ARRAYS, FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM, Entry
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_files import write_statistics
+from a2g_jax.data.corpus_layout import ARRAYS, FORMAT, MANIFEST, PARTS, VERSION, VERSION_ON_DEMAND, WAVEFORM
+from a2g_jax.data.corpus_manifest import fingerprint_of
 from a2g_jax.data.featurise import Prepared as Prepared
 from a2g_jax.data.featurise import Skipped as Skipped
 from a2g_jax.data.featurise import prepare_recording as prepare_recording
 from a2g_jax.data.journal import Unfinished
 from a2g_jax.data.prepared_checks import check_finite, is_still
 from a2g_jax.data.settings import Features
-from a2g_jax.data.splits import Splits, official_splits
+from a2g_jax.data.splits import official_splits
 from a2g_jax.errors import InputError, Interrupted, OutputError
-from a2g_jax.features.statistics import RunningStatistics
 from a2g_jax.io.files import disk_full, make_folder, read_json, sha256_file, unwritable, write_json
 from a2g_jax.io.locks import locked
 from a2g_jax.io.sealed import write_sealed
 
-#: Lower bounds on standard deviations, which are used as divisors.
-_FLOORS = {"audio": 1.0, "pose": 0.01, "root": 0.01}
-#: Rows read at once for the statistics.
-_ROWS = 65536
 #: Version of the layout of unfinished work; work of another one is discarded.
 _LAYOUT = 2
 _RECIPE = "recipe.json"
@@ -286,19 +281,3 @@ def finish_corpus(work: Unfinished, path: Path, plan: Plan, report: Callable[[st
     write_sealed(folder / MANIFEST, manifest)
     folder.replace(path)
     shutil.rmtree(work.folder, ignore_errors=True)
-
-
-def write_statistics(folder: Path, entries: Sequence[Entry], splits: Splits) -> None:
-    """Write means and standard deviations of a corpus's arrays over its training split only."""
-    values: dict[str, Any] = {}
-    for name in ARRAYS:
-        key = name.removesuffix(".npy")
-        array = np.load(folder / name, mmap_mode="r", allow_pickle=False)
-        running = RunningStatistics()
-        for recording, start, stop in splits["train"]:
-            first = entries[recording].first
-            for row in range(first + start, first + stop, _ROWS):
-                running.add(array[row : min(row + _ROWS, first + stop)])
-        statistics = running.result(_FLOORS[key])
-        values[f"{key}_mean"], values[f"{key}_std"] = statistics.mean, statistics.std
-    np.savez(folder / "statistics.npz", **values)

@@ -23,7 +23,8 @@ from a2g_jax.data.featurise import Prepared, Skipped
 from a2g_jax.data.settings import Features
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import WIDTHS, layout_rows
+from a2g_jax.geometry.pose_rows import layout_rows
+from a2g_jax.geometry.pose_space import WIDTHS
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import make_folder, sha256_file, write_json
 

@@ -22,7 +22,7 @@ from a2g_jax.data.settings import Features
 from a2g_jax.data.workers import in_order, worker_pool
 from a2g_jax.errors import InputError, InputWarning
 from a2g_jax.features.speech_likeness import why_no_speech
-from a2g_jax.geometry.pose_space import interchangeable
+from a2g_jax.geometry.pose_rows import interchangeable
 from a2g_jax.geometry.skeleton import Skeleton
 from a2g_jax.io.files import sha256_file
 from a2g_jax.io.reading import reading

@@ -15,7 +15,8 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import check_synthesizer
 from a2g_jax.data.splits import Segment
 from a2g_jax.errors import InputError
-from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.rotation import matrix_from_axis_angle
 from a2g_jax.talker.recordings import resample_motion, talk

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
-from a2g_jax.geometry.pose_space import PoseSpace, rotations_from_rows, unit_vectors
+from a2g_jax.geometry.pose_rows import rotations_from_rows, unit_vectors
+from a2g_jax.geometry.pose_space import PoseSpace
 
 Values = Float[np.ndarray, "T R D"]
 

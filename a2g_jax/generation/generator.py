@@ -14,7 +14,7 @@ from a2g_jax.features.samples import mono_samples
 from a2g_jax.generation.engine import WINDOW, Engine, Rows
 from a2g_jax.generation.planting import planted
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.io.audio import resampled
 from a2g_jax.models.base import Condition
 from a2g_jax.models.control_curves import check_ends

@@ -13,7 +13,7 @@ from a2g_jax.generation.clips import read_facing
 from a2g_jax.generation.generator import Generator, plant_rotations
 from a2g_jax.generation.seed_bounds import REMEDY, seed_stretches
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.metrics.body.check import Stretch
 from a2g_jax.training.run import Run

@@ -1,6 +1,7 @@
 """The meaning of a pose's numbers: rotations of joints, directions of bones, or keypoints.
 
-The only module that compares the kinds of poses by name; all others use a :class:`PoseSpace`.
+This module and :mod:`a2g_jax.geometry.pose_rows` alone compare the kinds of poses by name; all others use a
+:class:`PoseSpace`.
 """
 
 from dataclasses import dataclass
@@ -15,19 +16,12 @@ from jaxtyping import Array, Float
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.body_joints import find_wrists
 from a2g_jax.geometry.euler import continuous_yxz
-from a2g_jax.geometry.host_rotation import matrices_from_6d
 from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_kinds import WIDTHS as WIDTHS
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.rotation import (
-    axis_angle_from_matrix,
-    matrix_from_6d,
-    matrix_from_axis_angle,
-    matrix_from_yxz,
-    matrix_to_6d,
-    yxz_from_matrix,
-)
+from a2g_jax.geometry.pose_rows import FROM_MATRIX, TO_MATRIX, layout_rows, rotations_from_rows
+from a2g_jax.geometry.rotation import matrix_from_6d, matrix_to_6d
 from a2g_jax.geometry.skeleton import Skeleton
 
 #: Names of the rows of a pose, for messages.
@@ -38,11 +32,6 @@ _NOUNS = {
     "directions": "bone directions",
     "keypoints": "keypoints",
 }
-
-
-#: Between local rotation matrices and the kinds of poses that are rotations.
-_TO_MATRIX = {"6d": matrix_from_6d, "exponential": matrix_from_axis_angle, "euler": matrix_from_yxz}
-_FROM_MATRIX = {"6d": matrix_to_6d, "exponential": axis_angle_from_matrix, "euler": yxz_from_matrix}
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +75,7 @@ class PoseSpace:
     @property
     def has_rotations(self) -> bool:
         """Whether poses are rotations of a skeleton's joints."""
-        return self.kind in _FROM_MATRIX
+        return self.kind in FROM_MATRIX
 
     @property
     def unit_scale(self) -> bool:
@@ -118,7 +107,7 @@ class PoseSpace:
         """Local rotation matrices; None where poses are no rotations."""
         if not self.has_rotations:
             return None
-        return _TO_MATRIX[self.kind](pose)
+        return TO_MATRIX[self.kind](pose)
 
     def from_rotations(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R D"]:
         """Poses of local rotation matrices.
@@ -128,7 +117,7 @@ class PoseSpace:
         """
         if not self.has_rotations:
             raise InputError(f"poses are {self.noun}; rotations cannot be written as these.")
-        return _FROM_MATRIX[self.kind](rotations)
+        return FROM_MATRIX[self.kind](rotations)
 
     def joint_positions(self, rotations: Float[Array, "*S R 3 3"]) -> Float[Array, "*S R 3"]:
         """Joint positions of local rotations in metres, the root at the origin."""
@@ -259,76 +248,3 @@ def _poses(rotations, kind: _Kind):
 def _positions(pose, offsets, kind: _Kind):
     rotations: Any = kind.space.rotations(jnp.asarray(pose))
     return joint_positions(rotations, offsets, kind.space.skeleton.parents)
-
-
-def layout_rows(layout: PoseLayout, kind: str) -> int:
-    """Rows of a pose without a skeleton: points for keypoints, bones for directions."""
-    return len(layout.names if kind == "keypoints" else layout.bones)
-
-
-def unit_vectors(values: Float[np.ndarray, "T R D"], kind: str, fallback: Float[np.ndarray, "T R D"]):
-    """Interpolated values made valid again: directions of length 1, keypoints as they are.
-
-    Args:
-        fallback: values where an interpolated direction has no length.
-    """
-    if kind != "directions":
-        return values
-    length = np.linalg.norm(values, axis=-1, keepdims=True)
-    return np.where(length > 1e-6, values / np.maximum(length, 1e-6), fallback)
-
-
-def interchangeable(kind: str) -> tuple[str, ...]:
-    """The kinds that a recording of one kind can be written in without loss; the kind itself first."""
-    return tuple(_FROM_MATRIX) if kind == "6d" else (kind,)
-
-
-def write_motion(motion: Motion, kind: str, where: str) -> tuple[Float[np.ndarray, "T R D"], Skeleton | PoseLayout]:
-    """Poses of a motion, and the body that their rows are of.
-
-    Args:
-        kind: a key of :data:`WIDTHS`.
-        where: the recording, for the error.
-
-    Raises:
-        InputError: keypoints, which a motion has none of.
-    """
-    if kind == "directions":
-        return _directions(motion)
-    rotations = np.asarray(motion.rotations, np.float32)
-    if kind == "6d":
-        return np.swapaxes(rotations[..., :2], -1, -2).reshape(*rotations.shape[:2], 6), motion.skeleton
-    if kind in _FROM_MATRIX:
-        return np.asarray(_written(rotations, kind)), motion.skeleton
-    raise InputError(
-        f"{where}: holds rotations of joints; prepare it with --pose {', '.join(_FROM_MATRIX)} or directions."
-    )
-
-
-def rotations_from_rows(values: Float[np.ndarray, "T J D"], kind: str) -> Float[np.ndarray, "T J 3 3"]:
-    """Rotation matrices of poses that are rotations."""
-    return matrices_from_6d(np.asarray(values)) if kind == "6d" else np.asarray(_matrices(values, kind))
-
-
-@partial(jax.jit, static_argnums=1)
-def _written(rotations, kind):
-    return _FROM_MATRIX[kind](rotations)
-
-
-@partial(jax.jit, static_argnums=1)
-def _matrices(values, kind):
-    return _TO_MATRIX[kind](values)
-
-
-def _directions(motion: Motion) -> tuple[Float[np.ndarray, "T B 3"], PoseLayout]:
-    """World directions from every joint's parent to the joint; joints that coincide with their parent are left out."""
-    skeleton = motion.skeleton
-    lengths = np.linalg.norm(np.asarray(skeleton.offsets), axis=-1)
-    children = [joint for joint, parent in enumerate(skeleton.parents) if parent >= 0 and lengths[joint] > 1e-4]
-    parents = [skeleton.parents[joint] for joint in children]
-    places = motion.positions()
-    vectors = places[:, children] - places[:, parents]
-    layout = PoseLayout(
-        skeleton.names, tuple(zip(parents, children, strict=True)), tuple(float(lengths[joint]) for joint in children)
-    )
-    return (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32), layout

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import layout_rows, unit_vectors, write_motion
+from a2g_jax.geometry.pose_rows import layout_rows, unit_vectors, write_motion
 from a2g_jax.geometry.skeleton import Skeleton
 
 

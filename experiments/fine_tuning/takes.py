@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from a2g_jax.data.corpus import Corpus, fingerprint_of
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_files import write_statistics
 from a2g_jax.data.corpus_layout import MANIFEST
-from a2g_jax.data.corpus_writer import prepare_recording, write_corpus, write_statistics
+from a2g_jax.data.corpus_manifest import fingerprint_of
+from a2g_jax.data.corpus_writer import prepare_recording, write_corpus
 from a2g_jax.data.folder import read_pair
 from a2g_jax.data.settings import Features
 from a2g_jax.data.splits import Segment

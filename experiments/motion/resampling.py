@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows, write_motion
+from a2g_jax.geometry.pose_rows import rotations_from_rows, write_motion
 
 
 def smooth_resample(motion: Motion, fps: float) -> Motion:

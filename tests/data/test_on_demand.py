@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from a2g_jax.data.batch import FIELDS, clip_shape
-from a2g_jax.data.corpus import Corpus, fingerprint_of
+from a2g_jax.data.corpus import Corpus
+from a2g_jax.data.corpus_manifest import fingerprint_of
 from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.on_demand import OnDemand, PartStream, split_roles
 from a2g_jax.data.prepare import prepare_talker

@@ -9,7 +9,7 @@ from a2g_jax.data.corpus import Corpus
 from a2g_jax.data.generated import TalkerOptions
 from a2g_jax.data.prepare import prepare_talker
 from a2g_jax.data.settings import find_features
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.talker import recordings
 
 

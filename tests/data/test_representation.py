@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.errors import InputError
 from a2g_jax.geometry.motion import Motion
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.geometry.pose_track import PoseTrack, represent, resample_track
 from a2g_jax.geometry.skeleton import Skeleton
 

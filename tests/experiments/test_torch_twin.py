@@ -168,6 +168,7 @@ def _compare(dtype, tolerance, config=CONFIG):
         )
 
 
+@pytest.mark.slow  # in double precision quickly
 def test_losses_and_gradients_agree():
     _compare(np.float32, 1e-3)
 

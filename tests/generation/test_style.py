@@ -91,7 +91,7 @@ def test_windows_leave_no_seam_and_no_length_compiles_anew():
         shorter = Style(small.encode_rows(own.rows[:frames], own.features[:frames]), "statistics", 0.9)
         assert next(small.rows(long.features[: 2 * frames - 20], 1, 5, shorter)).shape == (2 * frames - 20, 22, 6)
     assert program._cache_size() == compiled == 1
-    assert small._encode._cache_size() == 2  # one window, and two for the long clip
+    assert small._encoder._encode._cache_size() == 2  # one window, and two for the long clip
 
 
 def test_a_sample_is_the_same_however_many_there_are():

@@ -8,7 +8,8 @@ from a2g_jax.errors import InputError
 from a2g_jax.geometry.mirror import mirror
 from a2g_jax.geometry.mirror_poses import pose_mirror
 from a2g_jax.geometry.pose_layout import PoseLayout
-from a2g_jax.geometry.pose_space import PoseSpace, write_motion
+from a2g_jax.geometry.pose_rows import write_motion
+from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.talker.recordings import talk
 
 

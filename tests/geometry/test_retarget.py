@@ -32,7 +32,7 @@ from a2g_jax.talker.skeleton import TALKER_SKELETON
 POSES = Poses.random(4, 3)
 
 
-@settings(max_examples=25, deadline=None)  # two rigs each
+@settings(max_examples=12, deadline=None)  # two rigs each
 @given(specs(), specs(), st.integers(0, 5))
 def test_there_and_back(first, second, seed):
     """Joints are found, the other rig shows the true pose, and the way back returns every matched joint."""
@@ -46,7 +46,7 @@ def test_there_and_back_on_hundreds_of_rigs(first, second, seed):
     go_there_and_back(first, second, seed)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=7, deadline=None)
 @given(specs(), specs(), layouts(), layouts(), st.integers(0, 5))
 def test_there_and_back_through_files(first, second, layout, other, seed):
     """The same, each motion written as BVH of any rotation order and unit and read again on its way."""

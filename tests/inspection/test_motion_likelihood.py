@@ -38,7 +38,7 @@ MODEL = StylizedFlowConfig(
     reverse_share=0.0,
 )
 TRAINING = TrainConfig(
-    steps=600,
+    steps=300,
     batch_size=16,
     learning_rate=3e-3,
     warmup_steps=20,

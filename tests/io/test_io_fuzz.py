@@ -19,7 +19,7 @@ from a2g_jax.io.npz import read_motion_npz, write_motion_npz
 from a2g_jax.io.textgrid import read_words, write_words
 from a2g_jax.recording import Word
 
-EXAMPLES = 100
+EXAMPLES = 40
 
 
 def motion() -> Motion:

@@ -198,7 +198,7 @@ def test_round_trip(words, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["google.json", "whisper.json", "gentle.json", "table.tsv", "grid.TextGrid"])
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_damaged_bytes(name, data, tmp_path_factory):
     folder = tmp_path_factory.getbasetemp()

@@ -62,7 +62,7 @@ values = st.recursive(
 )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(value=values)
 def test_round_trip(value):
     assert same(attempt(decode_arrow, arrow_payload(value)), value)
@@ -174,7 +174,7 @@ def test_limit():
 WHOLES = list(STORED.values())
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=damaged(WHOLES))
 def test_damaged_payloads(data):
     attempt(decode_arrow, data)

@@ -192,7 +192,7 @@ def folder(tmp_path_factory):
     return path
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_damaged_databases(data, folder):
     whole = (folder / "whole" / "data.mdb").read_bytes()
@@ -211,7 +211,7 @@ def test_damaged_databases(data, folder):
     assert calls_made(contents, path, limits) < 10_000 + path.stat().st_size
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_damaged_headers_and_nodes(data, folder):
     """Numbers that mean something, changed: headers of pages, places of nodes, and nodes."""

@@ -232,13 +232,13 @@ WHOLES = [
 ]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=damaged(WHOLES), objects=st.booleans())
 def test_damaged_archives(data, objects, folder):
     check(read_npz, folder / "a.npz", data, objects)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=damaged([*map(npy, ARRAYS.values()), npy(np.array([1, "a"], object), pickled=True)]), objects=st.booleans())
 def test_damaged_arrays(data, objects, folder):
     check(read_npy, folder / "a.npy", data, objects)

@@ -385,13 +385,13 @@ BITS = [
 ]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=damaged(WHOLES))
 def test_damaged_pickles(data):
     attempt(decode_pickle, data)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.lists(st.sampled_from(BITS), max_size=40).map(b"".join), end=st.booleans())
 def test_programs_of_random_opcodes(data, end):
     attempt(decode_pickle, data + b"." * end)

@@ -16,9 +16,10 @@ from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Data
 from a2g_jax.models.stylized_flow.autoregression import Sampling, proceed, start
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
+from a2g_jax.models.stylized_flow.extras import Extras
 from a2g_jax.models.stylized_flow.likelihood import log_likelihood
 from a2g_jax.models.stylized_flow.model import build, draw_latents
-from a2g_jax.models.stylized_flow.networks import Extras, FlowNetworks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.training.state import joint_loss
 from tests.arrays_for_tests import on_device

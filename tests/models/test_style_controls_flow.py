@@ -20,8 +20,9 @@ from a2g_jax.models.control_curves import from_percentiles, parse_curves
 from a2g_jax.models.stylized_flow.autoregression import proceed, start
 from a2g_jax.models.stylized_flow.config import PRESETS, StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import measure, requested, scaled
+from a2g_jax.models.stylized_flow.extras import Extras
 from a2g_jax.models.stylized_flow.model import build
-from a2g_jax.models.stylized_flow.networks import Extras, FlowNetworks
+from a2g_jax.models.stylized_flow.networks import FlowNetworks
 from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.models.train_config import TrainConfig
 from a2g_jax.training.stages import stage_spans

@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 import pytest
-from test_voice import SPEAKERS, energy_db, measured_f0
+from voice_for_tests import energy_db, measured_f0
 
 from a2g_jax.cli import main
 from a2g_jax.data.corpus import Corpus
@@ -19,6 +19,7 @@ from a2g_jax.talker import recordings
 from a2g_jax.talker.demo_speech import demo_speech
 from a2g_jax.talker.languages import LANGUAGES
 from a2g_jax.talker.recordings import cast, resample_motion, talk
+from a2g_jax.talker.speakers import SPEAKERS
 from a2g_jax.talker.speech import plan_from_json, plan_to_json
 from a2g_jax.talker.voices import library
 from a2g_jax.talker.voices.library import Phoneme, Utterance

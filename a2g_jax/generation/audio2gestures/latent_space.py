@@ -14,7 +14,7 @@ from a2g_jax.generation.controls import control_rows
 from a2g_jax.generation.engine import WINDOW
 from a2g_jax.generation.generator import plant_rotations, speech_features
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
 from a2g_jax.models.audio2gestures.edit_presets import expanded

@@ -12,7 +12,7 @@ from a2g_jax.generation.live.feet import Feet
 from a2g_jax.generation.live.poses import PoseProgram, Poses
 from a2g_jax.generation.live.rates import check_rate
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.training.run import Run
 
 #: Seconds of motion that are generated at a time.

@@ -20,7 +20,7 @@ from a2g_jax.generation.planting import planted
 from a2g_jax.generation.programs import manifest as files
 from a2g_jax.generation.programs.manifest import Manifest, check_flatbuffers
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 
 #: Inputs that may be left out, and their value then.
 _FREE = {"controls": np.nan}

@@ -4,31 +4,25 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from a2g_jax.errors import InputError
-from a2g_jax.features.mel import log_mel
 from a2g_jax.generation.controls import sampled
 from a2g_jax.generation.engine import LANES, WINDOW
 from a2g_jax.generation.generator import Generator, plant_rotations, speech_features
+from a2g_jax.generation.stylized_flow.encoder import ClipEncoder, Earlier, LogMel, Rows
 from a2g_jax.generation.stylized_flow.fit import Fitted, fit
-from a2g_jax.generation.stylized_flow.requests import matching_requests
+from a2g_jax.generation.stylized_flow.requests import matching_requests, requested_hands
 from a2g_jax.generation.stylized_flow.seam import continued
 from a2g_jax.generation.stylized_flow.style import Style, drive, within_training
 from a2g_jax.geometry.motion import Motion
-from a2g_jax.geometry.pose_space import rotations_from_rows
+from a2g_jax.geometry.pose_rows import rotations_from_rows
 from a2g_jax.geometry.pose_track import represent
 from a2g_jax.geometry.retarget.onto import on_skeleton
 from a2g_jax.metrics.style import HandStyle
 from a2g_jax.models.control_curves import parse_curves, parse_gains
 from a2g_jax.training.run import Run
-
-Rows = Float[np.ndarray, "T R D"]
-Earlier = Float[np.ndarray, "S R D"]
-LogMel = Float[np.ndarray, "F bands"]
 
 #: Largest :attr:`~a2g_jax.generation.stylized_flow.style.Style.trust` in a clip: its code and controls hold more of
 #: a style, and with all of the latents hands are up to twice as fast as the clip's where the speech is another.
@@ -57,21 +51,13 @@ class FlowSpace:
                 f"a run of {run.config.model} has no latents of frames for a style, and takes no seed poses; use a run"
                 " of stylized_flow."
             )
-        self.run, self._window = run, window
+        self.run = run
         self.generator = Generator(run, window)
         #: Poses before a frame in its conditioning.
         self.history: int = model.seed_frames
         #: Values of a latent.
         self.channels: int = model.density.dimensions if model.density else int(np.prod(run.config.space.shape))
-        self._lookahead = model.lookahead
-        self._params = jax.device_put(run.params)
-        self._encode = jax.jit(model.encode)
-        measure = model.controls.measure if model.controls else None
-        measure = measure or (lambda pose: jnp.zeros((*pose.shape[:2], 0)))
-        self._controls = jax.jit(measure)
-        self._density = None if model.density is None else jax.jit(model.density.log_likelihood)
-        self._code = None if model.style_code is None else jax.jit(model.style_code)
-        self._clip_frames = model.clip_frames
+        self._encoder = ClipEncoder(run, model, window)
         self._names = model.controls.names if model.controls else ()
 
     def encode(
@@ -91,24 +77,8 @@ class FlowSpace:
         """
         config = self.run.config
         motion = on_skeleton(motion, config.skeleton, config.fps, name)
-        frames, features = self._speech(motion, audio, name)
+        frames, features = self._encoder.speech(motion, audio, name)
         return self.encode_rows(represent(motion, config.space.kind, name)[0][:frames], features)
-
-    def _speech(
-        self, motion: Motion, audio: Float[np.ndarray, " N"] | None, name: str
-    ) -> tuple[int, Float[np.ndarray, "T bands"] | None]:
-        """Frames of a clip that have speech, and log-mel rows of these; all frames and None without audio."""
-        if audio is None:
-            return motion.frames, None
-        config = self.run.config
-        sound, seconds = len(audio) / config.mel.sample_rate, motion.seconds
-        # The same tolerance as in the preparation of corpora.
-        if abs(sound - seconds) > max(1.0, 0.05 * max(sound, seconds)):
-            raise InputError(
-                f"{name}: its audio lasts {sound:.2f} s and its motion {seconds:.2f} s; cut them to the same take."
-            )
-        frames = min(motion.frames, round(sound * config.fps))
-        return frames, log_mel(audio, config.mel, config.fps, frames)
 
     def encode_rows(
         self, rows: Rows, features: LogMel | None = None, before: Earlier | None = None
@@ -123,8 +93,7 @@ class FlowSpace:
         Raises:
             InputError: no frames, too few poses before them, or another number of audio rows.
         """
-        audio, poses, controls, code = self._padded(rows, features, before)
-        return np.asarray(self._encode(self._params, audio, poses, controls, code))[: len(rows)]
+        return self._encoder.latents(rows, features, before)
 
     def log_likelihood(self, rows: Rows, features: LogMel | None = None) -> Float[np.ndarray, " T"]:
         """Log-density of poses in nats, frame by frame, given the speech and the poses before; the first pose is held
@@ -132,39 +101,7 @@ class FlowSpace:
 
         Arguments and errors of :meth:`encode_rows`.
         """
-        assert self._density is not None
-        audio, poses, _, _ = self._padded(rows, features, None)
-        return np.asarray(self._density(self._params, audio[None], poses[None]))[0, : len(rows)]
-
-    def _padded(self, rows: Rows, features: LogMel | None, before: Earlier | None) -> tuple[Any, Any, Any, Any]:
-        """Audio, poses and controls of a clip and the frames around it, and its style code."""
-        frames = len(rows)
-        if features is None:
-            features = np.full((frames, self.run.config.mel.width), self._silence(), np.float32)
-        if frames == 0 or len(features) != frames:
-            raise InputError(f"a clip has {frames} poses and {len(features)} rows of audio; expected as many, above 0.")
-        # Frames after the clip do not affect its latents, and one size for many lengths compiles once.
-        after = -frames % self._window + self._lookahead
-        earlier = np.repeat(rows[:1], self.history, axis=0) if before is None else self._last(before)
-        poses = np.concatenate([earlier, rows, np.repeat(rows[-1:], after, axis=0)])
-        padded = np.pad(features, ((self.history, after), (0, 0)), constant_values=float(features.min()))
-        audio = np.asarray(self.run.config.statistics["audio"].normalise(padded), np.float32)
-        # Style controls are averages over seconds: of the clip only, not of the padding around it.
-        controls = np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0]
-        controls = np.pad(controls, ((self.history, after), (0, 0)), mode="edge")
-        return audio, np.asarray(poses, np.float32), controls, self._style_code(rows)
-
-    def _style_code(self, rows: Rows) -> Float[np.ndarray, " S"] | None:
-        """Mean style code of parts of a clip that are as long as those of training; None without such codes."""
-        if self._code is None:
-            return None
-        frames = self._clip_frames
-        padded = np.pad(
-            rows, ((0, max(0, frames - len(rows))), (0, 0), (0, 0)), mode="reflect" if len(rows) > 1 else "edge"
-        )
-        firsts = range(0, len(padded) - frames + 1, max(1, frames // 2))
-        parts = [self._code(self._params, np.asarray(padded[first : first + frames], np.float32)) for first in firsts]
-        return np.asarray(np.mean(parts, axis=0), np.float32)
+        return self._encoder.log_likelihood(rows, features)
 
     def style(
         self,
@@ -194,7 +131,7 @@ class FlowSpace:
         name: str = "the clip",
     ) -> tuple[Style, Fitted]:
         """The style of a fitted clip, and the clip with the figures of its latents."""
-        frames, features = self._speech(clip.motion, audio, name)
+        frames, features = self._encoder.speech(clip.motion, audio, name)
         rows = clip.rows[:frames]
         own = self.encode_rows(rows, features)
         means = self.run.summary.get("latent_mean")
@@ -209,7 +146,7 @@ class FlowSpace:
         measured = replace(clip, code=float(np.median(sizes)), adapted=replace(clip.adapted, latents=factor))
         # The more the latents had to shrink, the less they hold of the clip's style.
         trust = min(_MOST_TRUST, float(np.sqrt(factor)))
-        return Style(latents, mode, share, self._style_code(rows), controls, trust), measured
+        return Style(latents, mode, share, self._encoder.style_code(rows), controls, trust), measured
 
     def generate(
         self,
@@ -267,7 +204,7 @@ class FlowSpace:
         seed_rows: Earlier | None = None,
     ) -> Iterator[Rows]:
         """Yield the rows of :meth:`generate` for log-mel rows, not normalised, and poses in the run's pose space."""
-        earlier = None if seed_rows is None else self._last(seed_rows)
+        earlier = None if seed_rows is None else self._encoder.last_poses(seed_rows)
         if style is not None and style.requests is None:
             style = self.match(style, features)
         yield from self.generator.rows(features, samples, seed, **self._given(style, len(features), earlier))
@@ -305,7 +242,7 @@ class FlowSpace:
 
     def _mean_controls(self, *motions: Rows) -> Float[np.ndarray, " K"]:
         """Mean controls of motions, metres and m/s."""
-        found = [np.asarray(self._controls(np.asarray(rows, np.float32)[None]))[0] for rows in motions]
+        found = [self._encoder.controls(rows) for rows in motions]
         return np.mean([values.mean(axis=0, dtype=np.float64) for values in found], axis=0)
 
     def _given(self, style: Style | None, frames: int, earlier: Earlier | None) -> dict[str, Any]:
@@ -334,24 +271,5 @@ class FlowSpace:
         """
         if not self._names:
             return clip
-        training, quantiles = np.asarray(self.run.summary["control_mean"]), self._controlled(frames)
-        found: dict[str, list[float]] = {}
-        for column, name in enumerate(self._names):
-            # Some runs have a height of each hand.
-            field = name.rpartition("_")[2]
-            if field in clip._fields and not np.isnan(quantiles[:, column]).all():
-                values = np.quantile(training[:, column], np.nan_to_num(quantiles[:, column]))
-                own = np.where(np.isnan(quantiles[:, column]), getattr(clip, field), values)
-                found.setdefault(field, []).append(float(own.mean()))
-        return clip._replace(**{field: float(np.mean(values)) for field, values in found.items()})
-
-    def _last(self, rows: Earlier) -> Float[np.ndarray, "history R D"]:
-        """The last poses, as many as are in the conditioning of a frame."""
-        if len(rows) < self.history:
-            raise InputError(f"the seed poses are {len(rows)} frames; the run needs {self.history} or more.")
-        return rows[-self.history :]
-
-    def _silence(self) -> float:
-        """About the floor of the training features: a standard deviation below the mean of the quietest band."""
-        audio = self.run.config.statistics["audio"]
-        return float(np.min(np.asarray(audio.mean) - np.asarray(audio.std)))
+        training = np.asarray(self.run.summary["control_mean"])
+        return requested_hands(clip, self._names, training, self._controlled(frames))

@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.metrics.style import HandStyle
+
 #: Corrections of a request. In three the distance of the hands from the goal falls to a third on generated speakers.
 PASSES = 3
 
@@ -45,3 +47,25 @@ def as_quantiles(values: Values, training: Float[np.ndarray, "N K"]) -> Values:
     ranks = np.linspace(0.0, 1.0, len(training))
     columns = zip(values, np.sort(training, axis=0).T, strict=True)
     return np.array([np.interp(value, column, ranks) for value, column in columns], np.float32)
+
+
+def requested_hands(
+    clip: HandStyle, names: Sequence[str], training: Float[np.ndarray, "N K"], quantiles: Float[np.ndarray, "T K"]
+) -> HandStyle:
+    """Mean hands that a style and requests of a speech stand for together.
+
+    Args:
+        clip: hands of the style's clip, which hold for what is not requested.
+        names: of the controls.
+        training: mean controls of every training clip.
+        quantiles: requests by frame; NaN where there is none.
+    """
+    found: dict[str, list[float]] = {}
+    for column, name in enumerate(names):
+        # Some runs have a height of each hand.
+        field = name.rpartition("_")[2]
+        if field in clip._fields and not np.isnan(quantiles[:, column]).all():
+            values = np.quantile(training[:, column], np.nan_to_num(quantiles[:, column]))
+            own = np.where(np.isnan(quantiles[:, column]), getattr(clip, field), values)
+            found.setdefault(field, []).append(float(own.mean()))
+    return clip._replace(**{field: float(np.mean(values)) for field, values in found.items()})

@@ -3,37 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
-from a2g_jax.errors import InputError
-from a2g_jax.io.untrusted.budget import CONVERT, Budget, clip
 from a2g_jax.io.untrusted.pickle_objects import Unfinished, find_global, finish, reduce
-from a2g_jax.io.untrusted.pickle_opcodes import REFUSED, Opcodes
+from a2g_jax.io.untrusted.pickle_stack import CONTAINER, SMALL, PickleStack
 from a2g_jax.io.untrusted.refused import Refused, RefusedError, check_read
 from a2g_jax.io.untrusted.values import check_key
 
-#: Bytes charged for a value and its place on the stack.
-_SMALL, _CONTAINER, _PLACEHOLDER = 64, 240, 1000
 _HIGHEST_PROTOCOL = 5
 
 
-class PickleMachine:
-    """Executes one pickle as data.
-
-    Args:
-        placeholders: whether objects that are refused become :class:`Refused` instead of raising their error.
-    """
-
-    def __init__(self, data: bytes, budget: Budget, placeholders: bool = False) -> None:
-        self.placeholders = placeholders
-        self.opcodes = Opcodes(data, budget)
-        self.budget = budget
-        self.stack: list[Any] = []
-        self.outer: list[list[Any]] = []  # the stacks below each mark
-        self.memo: dict[int, Any] = {}
-
-    @property
-    def at(self) -> int:
-        """Byte of the current opcode."""
-        return self.opcodes.at
+class PickleMachine(PickleStack):
+    """Executes one pickle as data."""
 
     def run(self) -> Any:
         """The value of the whole pickle.
@@ -54,54 +33,16 @@ class PickleMachine:
         check_read(value)
         return value
 
-    def damage(self, what: str) -> InputError:
-        return self.budget.damage(self.at, what)
-
-    def push(self, value: Any, size: int = _SMALL) -> None:
-        self.budget.charge(size, self.at)
-        self.stack.append(value)
-
-    def pop(self) -> Any:
-        if not self.stack:
-            raise self.damage("it uses a value of an empty stack")
-        return self.stack.pop()
-
-    def refuse(self, error: RefusedError) -> None:
-        """Push a placeholder, or raise the error."""
-        if not self.placeholders:
-            raise error
-        self.budget.work(4, self.at)
-        self.budget.charge(_PLACEHOLDER, self.at)
-        self.push(Refused(str(error)))
-
-    def refuse_opcode(self, name: str) -> None:
-        what = f"holds {REFUSED[name]}, which is refused, and nothing was run; {CONVERT}."
-        self.refuse(self.budget.refused(self.at, what))
-
-    def top(self, kind: type) -> Any:
-        """The container on the stack; a new one, which is dropped, on top of an object that was refused."""
-        if self.stack and isinstance(self.stack[-1], Refused):
-            return kind()
-        if not self.stack or type(self.stack[-1]) is not kind:
-            raise self.damage(f"it adds to a {kind.__name__} that does not exist")
-        return self.stack[-1]
-
-    def marked(self) -> list[Any]:
-        if not self.outer:
-            raise self.damage("it uses a mark that does not exist")
-        items, self.stack = self.stack, self.outer.pop()
-        return items
-
     def add_pairs(self, target: dict, items: list[Any]) -> None:
         if len(items) % 2:
             raise self.damage("a dictionary has a key without a value")
-        self.budget.charge(_SMALL * len(items), self.at)
+        self.budget.charge(SMALL * len(items), self.at)
         for key, value in zip(items[::2], items[1::2], strict=True):
             check_key(key, target, self.budget, self.at)
             target[key] = value
 
     def add_members(self, target: set, items: list[Any]) -> None:
-        self.budget.charge(_SMALL * len(items), self.at)
+        self.budget.charge(SMALL * len(items), self.at)
         for item in items:
             check_key(item, target, self.budget, self.at)
             target.add(item)
@@ -112,22 +53,6 @@ class PickleMachine:
 
     def python2_text(self, raw: bytes) -> None:
         self.push(raw.decode("ascii") if raw.isascii() else raw)
-
-    def remember(self, key: int) -> None:
-        if not self.stack:
-            raise self.damage("it stores a value of an empty stack")
-        self.budget.charge(_SMALL, self.at)
-        self.memo[key] = self.stack[-1]
-
-    def recall(self, key: int) -> None:
-        if key not in self.memo:
-            raise self.damage(f"it recalls value {clip(key)}, which it never stored")
-        value = self.memo[key]
-        if isinstance(value, Unfinished):
-            if not value.done:
-                raise self.damage("it uses an array before its content")
-            value = value.value
-        self.push(value)
 
     def global_stack(self) -> None:
         name, module = self.pop(), self.pop()
@@ -145,7 +70,7 @@ class PickleMachine:
     def call(self) -> None:
         arguments, function = self.pop(), self.pop()
         try:
-            self.push(reduce(function, arguments, self.budget, self.at), _CONTAINER)
+            self.push(reduce(function, arguments, self.budget, self.at), CONTAINER)
         except RefusedError as error:
             self.refuse(error)
 
@@ -214,38 +139,20 @@ class PickleMachine:
     def make_dict(self) -> None:
         result: dict[Any, Any] = {}
         self.add_pairs(result, self.marked())
-        self.push(result, _CONTAINER)
+        self.push(result, CONTAINER)
 
     def make_frozenset(self) -> None:
         members: set[Any] = set()
         self.add_members(members, self.marked())
-        self.push(frozenset(members), _CONTAINER)
+        self.push(frozenset(members), CONTAINER)
 
     def make_list(self) -> None:
         items = self.marked()
-        self.push(items, _CONTAINER + 16 * len(items))
+        self.push(items, CONTAINER + 16 * len(items))
 
     def make_tuple(self) -> None:
         items = self.marked()
-        self.push(tuple(items), _CONTAINER + 8 * len(items))
-
-    def mark(self) -> None:
-        self.budget.charge(_CONTAINER, self.at)
-        self.outer.append(self.stack)
-        self.stack = []
-
-    def drop(self) -> None:
-        if self.stack:
-            self.stack.pop()
-        else:
-            self.marked()
-
-    def drop_marked(self) -> None:
-        self.marked()
-
-    def duplicate(self) -> None:
-        self.push(self.pop(), 0)
-        self.push(self.stack[-1])
+        self.push(tuple(items), CONTAINER + 8 * len(items))
 
     def protocol(self, version: int) -> None:
         if version > _HIGHEST_PROTOCOL:
@@ -273,7 +180,7 @@ _ACTIONS: dict[str, Callable[[PickleMachine, Any], None]] = {
     "SHORT_BINSTRING": lambda m, text: m.python2_text(text.encode("latin-1")),
     # Containers.
     "MARK": lambda m, _: m.mark(),
-    "EMPTY_LIST": lambda m, _: m.push([], _CONTAINER),
+    "EMPTY_LIST": lambda m, _: m.push([], CONTAINER),
     "LIST": lambda m, _: m.make_list(),
     "APPEND": lambda m, _: m.append(),
     "APPENDS": lambda m, _: m.appends(),
@@ -282,11 +189,11 @@ _ACTIONS: dict[str, Callable[[PickleMachine, Any], None]] = {
     "TUPLE1": lambda m, _: m.tuple_of(1),
     "TUPLE2": lambda m, _: m.tuple_of(2),
     "TUPLE3": lambda m, _: m.tuple_of(3),
-    "EMPTY_DICT": lambda m, _: m.push({}, _CONTAINER),
+    "EMPTY_DICT": lambda m, _: m.push({}, CONTAINER),
     "DICT": lambda m, _: m.make_dict(),
     "SETITEM": lambda m, _: m.set_item(),
     "SETITEMS": lambda m, _: m.set_items(),
-    "EMPTY_SET": lambda m, _: m.push(set(), _CONTAINER),
+    "EMPTY_SET": lambda m, _: m.push(set(), CONTAINER),
     "ADDITEMS": lambda m, _: m.add_items(),
     "FROZENSET": lambda m, _: m.make_frozenset(),
     # The stack and the memo.

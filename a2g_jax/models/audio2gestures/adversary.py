@@ -15,7 +15,8 @@ from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.models.audio2gestures.codec import Codec
-from a2g_jax.models.audio2gestures.objective import code_noise, motion_terms
+from a2g_jax.models.audio2gestures.motion_terms import motion_terms
+from a2g_jax.models.audio2gestures.objective import code_noise
 from a2g_jax.models.base import Params, Stage, Update
 from a2g_jax.models.judged_motion import judged_motion
 from a2g_jax.models.train_config import TrainConfig

@@ -9,15 +9,13 @@ from jaxtyping import Array, Float, Int, Key
 
 from a2g_jax.data.batch import Batch
 from a2g_jax.errors import InputError
-from a2g_jax.features.similarity import lpips, ssim, stft_distance
 from a2g_jax.models.audio2gestures import losses
 from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.audio2gestures.config import Audio2GesturesConfig
+from a2g_jax.models.audio2gestures.motion_terms import Terms, sampled_terms, translation_terms
 from a2g_jax.models.audio2gestures.networks import Gaussian
 from a2g_jax.models.base import Params
 from a2g_jax.nn.rates import shifted
-
-Terms = dict[str, Array]
 
 #: Losses of motions with random codes.
 _OF_RANDOM_CODES = (
@@ -26,8 +24,6 @@ _OF_RANDOM_CODES = (
 )
 #: Smallest share of the KL weights at the beginning of a ramp that restarts, as in the authors' code.
 _LOWEST_RAMP = 1e-4
-#: Added to the losses of a motion that stands still, for batches without any motion.
-_STILL_EPSILON = 1e-6
 
 
 def check_objective(config: Audio2GesturesConfig) -> None:
@@ -129,7 +125,7 @@ def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     turns = None if rotations is None else jnp.split(rotations, 3 + draws)
 
     clips = len(batch.pose)
-    values = _motion_terms(codec, batch.pose, pose[: 2 * clips], turns, target, [rebuilt, transferred])
+    values = translation_terms(codec, batch.pose, pose[: 2 * clips], turns, target, [rebuilt, transferred])
     values |= {
         "alignment": losses.alignment_loss(s_audio, s_motion),
         "spread": losses.spread_loss(audio_shared.mean) + losses.spread_loss(motion_shared.mean),
@@ -138,7 +134,7 @@ def _split_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     }
     if sampled:
         turn = None if turns is None else turns[3]
-        values |= _sampled_terms(codec, target, turns, sampled, transferred)
+        values |= sampled_terms(codec, target, turns, sampled, transferred)
         # A valid pose is encoded again: 6D of the rotations, not the raw output.
         again = codec.valid(pose[2 * clips : 3 * clips], turn)
         shared_again, specific_again = codec.encode_motion(params, again, drop[3])
@@ -182,30 +178,6 @@ def _random_codes(
     return list(jnp.split(mapped.sample(keys[2]), 2)), mapped
 
 
-def _sampled_terms(
-    codec: Codec, target: Array, turns: list[Array] | None, sampled: list[Array], transferred: Array
-) -> Terms:
-    """Losses of motions with a random specific code (Eq. 19 and 21, and the authors' code).
-
-    Args:
-        turns: rotations of the truth, of both reconstructions, and of the samples; None for poses without rotations.
-        sampled: positions of two samples, or of one where samples are to differ from the transferred motion.
-        transferred: positions of g(S_A, I_M).
-    """
-    config, reduce, scale = codec.config, codec.reductions, _scales(codec, target, turns)
-    reference = sampled[1] if config.diversity_reference == "sample" else jax.lax.stop_gradient(transferred)
-    values = {
-        "relaxed": reduce.relaxed(sampled[0], target) / scale["position"],
-        "sampled_speed": reduce.speed(sampled[0], target) / scale["speed"],
-        "diversity": -reduce.position(sampled[0], reference) / scale["position"],
-    }
-    if turns is not None:
-        values["sampled_rotation"] = reduce.rotation(turns[3], turns[0]) / scale["rotation"]
-    if config.sampled_stft_weight > 0:
-        values["sampled_stft"] = jnp.mean(stft_distance(_flat(sampled[0]), _flat(target)))
-    return values
-
-
 def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch) -> Terms:
     """Without a motion-specific code: only reconstruction and alignment (Table 2, baseline)."""
     config = codec.config
@@ -219,7 +191,7 @@ def _joint_terms(codec: Codec, params: Params, key: Key[Array, ""], batch: Batch
     target, rebuilt, transferred = jnp.split(places, 3)
     turns = None if rotations is None else jnp.split(rotations, 3)
     return {
-        **_motion_terms(codec, batch.pose, pose, turns, target, [rebuilt, transferred]),
+        **translation_terms(codec, batch.pose, pose, turns, target, [rebuilt, transferred]),
         "alignment": losses.alignment_loss(s_audio, s_motion),
         "spread": losses.spread_loss(audio_shared.mean) + losses.spread_loss(motion_shared.mean),
         **_shared_kl(codec, audio_shared, motion_shared),
@@ -233,81 +205,3 @@ def _shared_kl(codec: Codec, audio: Gaussian, motion: Gaussian) -> Terms:
     if codec.config.latent == "dct":
         return {}
     return {"kl_shared": codec.reductions.kl(audio) + codec.reductions.kl(motion)}
-
-
-def _scales(codec: Codec, target: Array, turns: list[Array] | None) -> dict[str, Any]:
-    """What the motion losses are divided by: 1, or the losses of a motion that stands still in the mean pose.
-
-    Args:
-        target: positions of the truth.
-        turns: its rotations first; None for poses without rotations.
-    """
-    if not codec.config.relative_losses:
-        return {"rotation": 1.0, "position": 1.0, "speed": 1.0}
-    reduce, data = codec.reductions, codec.data
-    mean = jnp.broadcast_to(jnp.asarray(data.pose_statistics.mean)[None, None], (1, 1, *data.space.shape))
-    rotations, places = codec.positions(mean)
-    still = {
-        "position": reduce.position(jnp.broadcast_to(places, target.shape), target),
-        "speed": reduce.speed(jnp.zeros_like(target), target),
-    }
-    if turns is not None and rotations is not None:
-        still["rotation"] = reduce.rotation(jnp.broadcast_to(rotations, turns[0].shape), turns[0])
-    return {name: value + _STILL_EPSILON for name, value in still.items()}
-
-
-def _flat(array: Float[Array, "B T R D"]) -> Float[Array, "B T _"]:
-    return array.reshape(*array.shape[:2], -1)
-
-
-def motion_terms(
-    codec: Codec, truth: Float[Array, "B T R D"], pose: Float[Array, "B2 T R D"]
-) -> tuple[Terms, dict[str, Any]]:
-    """The motion losses of decoded poses against the truth, and their weights.
-
-    Args:
-        pose: raw outputs, twice as many clips as the truth has.
-    """
-    rotations, places = codec.positions(jnp.concatenate([truth, pose]))
-    target, *made = jnp.split(places, 3)
-    turns = None if rotations is None else jnp.split(rotations, 3)
-    terms = _motion_terms(codec, truth, pose, turns, target, made)
-    return terms, {name: getattr(codec.config, f"{name}_weight") for name in terms}
-
-
-def _motion_terms(
-    codec: Codec,
-    truth: Float[Array, "B T R D"],
-    pose: Float[Array, "B2 T R D"],
-    turns: list[Array] | None,
-    target: Array,
-    made: list[Array],
-) -> Terms:
-    """Losses of the reconstruction and of the audio-to-motion translation against the truth (Eq. 1, 6, 7, 14).
-
-    Args:
-        pose: the raw outputs of both.
-        turns: rotations, those of the truth and of both first; None for poses without rotations.
-        target: positions of the truth.
-        made: positions of both.
-    """
-    config, reduce, scale = codec.config, codec.reductions, _scales(codec, target, turns)
-    both, twice = jnp.concatenate(made), jnp.concatenate([target, target])
-    values = {
-        "position": reduce.position(both, twice) / scale["position"],
-        "speed": reduce.speed(both, twice) / scale["speed"],
-    }
-    if turns is not None:
-        rotation = reduce.rotation(jnp.concatenate(turns[1:3]), jnp.concatenate([turns[0]] * 2))
-        values["rotation"] = rotation / scale["rotation"]
-    if config.stft_weight > 0:
-        values["stft"] = jnp.mean(stft_distance(_flat(both), _flat(twice)))
-    if config.ssim_weight > 0:
-        values["ssim"] = 1.0 - jnp.mean(ssim(_flat(both), _flat(twice)))
-    if config.lpips_weight > 0:
-        features = codec.data.perceptual
-        assert features is not None
-        valid = codec.valid(pose, None if turns is None else jnp.concatenate(turns[1:3]))
-        ours, theirs = features(valid), features(truth)
-        values["lpips"] = jnp.mean(lpips(ours, [jnp.concatenate([block, block]) for block in theirs]))
-    return values

@@ -161,6 +161,11 @@ class StylizedFlowConfig:
         return self.history_frames * self.stride
 
     @property
+    def after(self) -> int:
+        """Poses at the end of a clip that only their audio is of use."""
+        return -(-self.lookahead_frames // self.stride)
+
+    @property
     def overlap(self) -> int:
         """Frames after the last one of a motion that its last frames depend on: those of the knots around them."""
         return AFTER * self.stride if self.stride > 1 else 0

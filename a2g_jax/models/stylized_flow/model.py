@@ -15,8 +15,9 @@ from a2g_jax.models.stylized_flow.autoregression import Limits, Sampling, State
 from a2g_jax.models.stylized_flow.conditioning import pose_mask
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
 from a2g_jax.models.stylized_flow.controls import check_controls, requested
+from a2g_jax.models.stylized_flow.extras import Extras
 from a2g_jax.models.stylized_flow.likelihood import log_likelihood, make_density
-from a2g_jax.models.stylized_flow.networks import AudioContext, Conditioning, Extras, FlowNetworks
+from a2g_jax.models.stylized_flow.networks import AudioContext, Conditioning, FlowNetworks
 from a2g_jax.models.stylized_flow.sampling import StylizedFlowSampling
 from a2g_jax.nn.flow.priors import spread
 from a2g_jax.nn.noise import frame_normal

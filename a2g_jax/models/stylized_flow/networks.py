@@ -10,9 +10,10 @@ from jaxtyping import Array, Bool, Float, Key
 from a2g_jax.models.base import Data, Latents, Params
 from a2g_jax.models.stylized_flow.audio_encoder import AudioEncoder
 from a2g_jax.models.stylized_flow.channels import Channels
-from a2g_jax.models.stylized_flow.conditioning import pose_history, windows
+from a2g_jax.models.stylized_flow.conditioning import inner, pose_history, windows
 from a2g_jax.models.stylized_flow.config import StylizedFlowConfig
-from a2g_jax.models.stylized_flow.controls import measure, scaled
+from a2g_jax.models.stylized_flow.controls import measure
+from a2g_jax.models.stylized_flow.extras import PLAIN, Extras, extra_values, extra_width
 from a2g_jax.models.stylized_flow.global_encoder import Fusion, WindowEncoder
 from a2g_jax.nn.flow.coupling import Shape
 from a2g_jax.nn.flow.glow import fit_glow, glow, glow_inverse, init_glow, prepare, project
@@ -25,21 +26,6 @@ from a2g_jax.nn.flow.predictor import (
     predictor_inverse,
     predictor_log_det,
 )
-
-
-class Extras(NamedTuple):
-    """Conditioning of clips apart from audio and poses; what is None is hidden."""
-
-    controls: Float[Array, "B T K"] | None = None
-    """Style controls of every frame, metres and m/s."""
-    shown: Bool[Array, "B T K"] | Bool[Array, "B 1 K"] | None = None
-    """Which controls are visible; all of those given if None."""
-    style: Float[Array, "B S"] | None = None
-    """Style codes, of :meth:`FlowNetworks.style`."""
-    styled: Bool[Array, " B"] | None = None
-    """Which style codes are visible; all of those given if None."""
-    mirrored: Bool[Array, " B"] | None = None
-    """Which clips are mirrored; none if None."""
 
 
 class Conditioning(NamedTuple):
@@ -67,10 +53,6 @@ class AudioContext(NamedTuple):
     """Mean and scale of the latents: 0 and 1 where they are drawn."""
 
 
-#: Nothing but audio and poses.
-PLAIN = Extras()
-
-
 class FlowNetworks:
     """Pure functions of parameters; ``flat`` poses are those of :mod:`a2g_jax.models.stylized_flow.channels`."""
 
@@ -82,7 +64,7 @@ class FlowNetworks:
         self.shape = Shape(
             self.channels,
             config.history_frames * self.channels + config.global_channels,
-            (2 * config.audio_channels or width) + self._extra_width,
+            (2 * config.audio_channels or width) + extra_width(config),
             config.hidden,
             config.layers,
             config.cell,
@@ -93,13 +75,6 @@ class FlowNetworks:
         self._fusion = Fusion(config.encoder_channels, config.global_channels)
         self._audio = AudioEncoder(config.audio_channels)
         self._style = WindowEncoder(*sizes, config.style_channels, config.strided_norm)
-
-    @property
-    def _extra_width(self) -> int:
-        """Values of :class:`Extras` in the context."""
-        config = self.config
-        controls = (2 if config.control_dropout > 0 else 1) * len(config.style_controls)
-        return int(config.mirror_flag) + (config.style_channels + 1 if config.style_channels else 0) + controls
 
     def init(self, key: Key[Array, ""]) -> Params:
         """Initial parameters, before the actnorms are fitted to data."""
@@ -158,7 +133,7 @@ class FlowNetworks:
             context = self.inner(self.embed_audio(params, audio)[:, :: config.stride])
         else:
             context = stretches.reshape(*stretches.shape[:2], -1)
-        return Conditioning(poses, jnp.concatenate([context, self._extra(extras, context)], axis=-1), before)
+        return Conditioning(poses, jnp.concatenate([context, extra_values(config, extras, context)], axis=-1), before)
 
     def visible(
         self, params: Params, before: Float[Array, "B N history C"], mask: Bool[Array, "B N history"] | None = None
@@ -181,36 +156,6 @@ class FlowNetworks:
         if stay is not None:
             return steps * stay
         return jnp.concatenate([steps[..., :-1, :], share * steps[..., -1:, :]], axis=-2)
-
-    def _extra(self, extras: Extras, like: Float[Array, "B N D"]) -> Float[Array, "B N E"]:
-        """Values of the context that are not audio, for the N poses of each clip that are conditioned on them."""
-        config, (clips, count) = self.config, like.shape[:2]
-        parts = [jnp.zeros((clips, count, 0), like.dtype)]
-        over = lambda values: jnp.broadcast_to(values[:, None], (clips, count, values.shape[1]))  # noqa: E731
-        if config.mirror_flag:
-            mirrored = jnp.zeros(clips) if extras.mirrored is None else extras.mirrored.astype(like.dtype)
-            parts.append(over(mirrored[:, None]))
-        if config.style_channels:
-            code = jnp.zeros((clips, config.style_channels)) if extras.style is None else extras.style
-            styled = jnp.full(clips, extras.style is not None) if extras.styled is None else extras.styled
-            seen = styled.astype(like.dtype)[:, None]
-            parts.append(over(jnp.concatenate([code * seen, seen], axis=-1)))
-        if names := config.style_controls:
-            hidden = jnp.zeros((clips, count, len(names)), like.dtype)
-            values, seen = hidden, hidden
-            if extras.controls is not None:
-                values = self._at(scaled(names, extras.controls), count)
-                seen = jnp.ones_like(values)
-                if extras.shown is not None:
-                    seen = jnp.broadcast_to(self._at(extras.shown.astype(like.dtype), count), values.shape)
-            parts += [values * seen, seen] if config.control_dropout > 0 else [values]
-        return jnp.concatenate(parts, axis=-1)
-
-    def _at(self, by_frame: Float[Array, "B T K"], count: int) -> Float[Array, "B N K"]:
-        """Values of whole clips at the N poses; those of N frames, or of a clip, as they are."""
-        if by_frame.shape[1] in (1, count):
-            return by_frame
-        return self.inner(by_frame[:, :: self.config.stride])
 
     def controls(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B T K"]:
         """Style controls of every frame of clips, metres and m/s; K is 0 without any."""
@@ -251,11 +196,11 @@ class FlowNetworks:
     @property
     def after(self) -> int:
         """Poses at the end of a clip that only their audio is of use."""
-        return -(-self.config.lookahead_frames // self.config.stride)
+        return self.config.after
 
     def inner(self, x: Float[Array, "B M C"]) -> Float[Array, "B N C"]:
         """The poses of a clip that have the whole conditioning around them."""
-        return x[:, self.config.history_frames : x.shape[1] - self.after]
+        return inner(self.config, x)
 
     def inner_frames(self, pose: Float[Array, "B T R D"]) -> Float[Array, "B N R D"]:
         """The frames of those poses."""
@@ -321,7 +266,7 @@ class FlowNetworks:
         prepared = prepare(params["glow"])
 
         def projected(extras: Extras) -> tuple[Array, ...]:
-            whole = jnp.concatenate([context, self._extra(extras, context[None])[0]], axis=-1)
+            whole = jnp.concatenate([context, extra_values(config, extras, context[None])[0]], axis=-1)
             return project(prepared, whole)
 
         plain = extras._replace(style=None, styled=None)

@@ -37,7 +37,9 @@ _SCRIPTS = (
     "hover",
     "timeline",
     "controls",
+    "labels",
     "player",
+    "page",
 )
 
 

@@ -19,8 +19,7 @@ class Player {
     this.renderer = makeRenderer(this.element("view"), location.hash !== "#2d");
     this.timeline = new Timeline(this);
     this.audio = this.loadAudio(speech);
-    this.makeLabels();
-    this.makeFiles();
+    this.labels = new Labels(this);
     fillLegend(this);
     this.makeControls();
     attachCamera(this.element("view"), this);
@@ -134,7 +133,7 @@ class Player {
     if (this.stale) {
       this.bands = arrange(this.figures, this.shown().map((figure) => figure.index), this.overlay && this.shown().length > 1, width, height);
       this.stale = false;
-      this.resetLabels(width);
+      this.labels.reset(width);
     }
     const theme = THEMES[this.scheme.matches ? "dark" : "light"];
     for (const band of this.bands) {
@@ -150,10 +149,10 @@ class Player {
     this.renderer.render({ bands: this.bands, width, height, ratio, theme, yaw: this.camera.yaw, overlay: this.overlay, still });
     this.renderer.scale = moving;
     this.pictures += 1;
-    this.placeLabels(width, height);
+    this.labels.place(width);
     this.timeline.draw();
     this.showClock();
-    this.showDoing();
+    this.labels.showDoing();
     this.adapt(stamp);
     if (this.opened) { this.opened(true); this.opened = null; }
   }
@@ -181,85 +180,6 @@ class Player {
     slider.setAttribute("aria-valuemax", this.duration.toFixed(1));
     slider.setAttribute("aria-valuenow", this.now.toFixed(1));
     slider.setAttribute("aria-valuetext", `${text} of ${total}`);
-  }
-
-  makeLabels() {
-    this.labels = this.figures.map((figure) => {
-      const label = document.createElement("button"), name = document.createElement("b"), note = document.createElement("span");
-      name.textContent = figure.label; note.textContent = figure.note;
-      label.append(name, ...(figure.note ? [note] : []));
-      if (doing(figure, 0)) {
-        label.doing = ["left", "right"].map(() => document.createElement("i"));
-        const both = document.createElement("span");
-        both.className = "doing";
-        both.append(...label.doing);
-        label.append(both);
-      }
-      label.style.setProperty("--own", figure.colour);
-      label.title = `Show ${figure.label} alone, or all again${figure.index < 9 ? ` (${figure.index + 1}, 0)` : ""}`;
-      label.addEventListener("click", () => this.solo(this.only === figure.index ? null : figure.index));
-      this.element("labels").append(label);
-      return label;
-    });
-  }
-
-  // Links to the files beside the page, those of each figure after its name.
-  makeFiles() {
-    for (const figure of this.figures.filter(({ files }) => files.length)) {
-      const group = document.createElement("span");
-      group.append(figure.label);
-      for (const name of figure.files) {
-        const link = document.createElement("a");
-        link.href = encodeURI(name);
-        link.download = name;
-        link.textContent = name.split(".").pop().toUpperCase();
-        link.title = `Download ${name}`;
-        group.append(link);
-      }
-      this.element("files").append(group);
-    }
-  }
-
-  // Labels stand under the feet; in the overlay they are a legend at the top.
-  placeLabels(width) {
-    const legend = this.overlay && this.shown().length > 1, step = Math.min(150, (width - 24) / this.labels.length);
-    for (const band of this.bands) band.members.forEach((index, k) => {
-      const label = this.labels[index], { style } = label;
-      if (legend) { style.transform = `translate(${Math.round(12 + k * step)}px, ${width < 640 ? 52 : 62}px)`; return; }
-      const room = band.members.length > 1 ? clamp(band.metre * band.spacing - 4, 56, 280) : Math.min(width - 20, 400);
-      if (label.room !== room) {
-        style.maxWidth = `${room}px`;
-        Object.assign(label, { room, wide: label.offsetWidth, tall: label.offsetHeight });
-      }
-      const [x, y] = onScreen(band, [band.slots[k][0], 0, 0.22 * band.frame.tall / 1.7]);
-      const left = clamp(x - label.wide / 2, 4, width - label.wide - 4), top = clamp(y + 6, band.y + 4, band.y + band.height - label.tall - 6);
-      style.transform = `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)`;
-    });
-  }
-
-  // Under each figure, the phases of its hands.
-  showDoing() {
-    for (const figure of this.shown()) {
-      const label = this.labels[figure.index];
-      if (label.doing) doing(figure, this.now).forEach(({ hand, phase, key }, k) => {
-        const text = `${hand[0].toUpperCase()} ${key || SHORT[phase] || phase}`, part = label.doing[k];
-        if (part.textContent === text) return;
-        part.textContent = text;
-        part.title = `${hand} hand: ${phase}${key ? `, ${key}` : ""}`;
-        part.className = phase;
-        part.style.background = key ? keyColour(key) : "";
-      });
-    }
-  }
-
-  // After the arrangement changed: which labels there are, and their sizes anew.
-  resetLabels(width) {
-    const legend = this.overlay && this.shown().length > 1;
-    this.labels.forEach((label, index) => {
-      label.hidden = !this.bands.some((band) => band.members.includes(index));
-      label.room = null;
-      label.style.maxWidth = legend ? `${Math.min(150, (width - 24) / this.labels.length) - 4}px` : "";
-    });
   }
 
   // --- choices ---
@@ -301,54 +221,3 @@ class Player {
     for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => this.view(VIEWS[button.dataset.view]));
   }
 }
-
-async function open(data) {
-  const unpacked = Promise.all(data.figures.map(unpackPositions)), meshes = Promise.all(data.meshes.map(unpackMesh));
-  const speech = await unpackSpeech(data.audio).catch((error) => {
-    console.warn("This browser cannot decode the speech; the figures move without it:", error.message);
-    return null;
-  });
-  return new Player(data, await unpacked, await meshes, speech);
-}
-
-let player = null;
-const opening = open(JSON.parse(document.getElementById("data").textContent)).then((made) => { player = made; return made.ready; });
-opening.catch((error) => {
-  document.getElementById("labels").textContent = `This browser is too old for the page (${error.message}).`;
-});
-// For tests and pictures; everything but `ready` is there once that has resolved.
-window.a2gPlayer = {
-  ready: opening,
-  get renderer() { return player.renderer.name; },
-  get figures() { return player.figures.map(({ label, note, fps, frames, points }) => ({ label, note, fps, frames, points })); },
-  play: () => player.play(),
-  pause: () => player.pause(),
-  seek: (time) => player.seek(time),
-  time: () => player.now,
-  frame: (index = 0) => Math.round(player.figures[index].frameAt(player.now)),
-  solo: (index) => player.solo(index),
-  view: (change) => player.view(change),
-  playing: () => player.playing,
-  vertices: (index = 0) => Array.from(player.figures[index].mesh.places),
-  // Draws moving pictures from a second on, 25 of a second, each complete before the next.
-  moving: (from, count) => {
-    const { gl } = player.renderer, pixel = new Uint8Array(4);
-    for (let i = 0; i < count; i++) {
-      player.now = from + 0.04 * i;
-      player.draw(performance.now(), false);
-      if (gl) gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-    }
-  },
-  pictures: () => player.pictures,
-  scale: () => player.renderer.scale,
-  speech: () => player.speech,
-  // The tooltip of a position in the detailed timeline, in CSS pixels from its corner; lanes from top to bottom.
-  tell: (x, y) => player.timeline.tell(x, y) || null,
-  lanes: () => player.timeline.rows().map(({ kind, height, lane, figure }) => ({ kind, height, name: lane ? lane.name : kind, figure: figure ? figure.label : null })),
-  // Resolves when a picture of the present moment, at full quality, is on screen.
-  still: () => new Promise((done) => requestAnimationFrame((stamp) => {
-    player.draw(stamp, true);
-    clearTimeout(player.settling);
-    requestAnimationFrame(() => requestAnimationFrame(() => done(true)));
-  })),
-};
