@@ -120,7 +120,17 @@ def toy_corpus(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def toy_run_config(toy_corpus):
+def shared_programs(toy_corpus):
+    """Trainings of Audio2Gestures on the toy corpus with one description share their compiled programs."""
+    from tests.shared_programs_for_tests import share_programs
+
+    with pytest.MonkeyPatch.context() as patch:
+        share_programs(patch, toy_corpus.fingerprint)
+        yield
+
+
+@pytest.fixture(scope="session")
+def toy_run_config(toy_corpus, shared_programs):
     """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings.
 
     Its learning rate is constant, so that trainings of any number of steps have one program.
