@@ -103,12 +103,10 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(tmp_path, toy_corpus, toy_
         assert np.all(np.isfinite(leaf))
 
 
-def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config):
+def test_validation_counts_every_clip_once(toy_corpus, toy_run, toy_run_config):
     """18 clips are a full batch and a small one; their mean is that of single clips."""
     config = toy_run_config()
-    model = config.build()
-    params = jax.jit(model.init)(jax.random.key(0))
-    figures = evaluation.Validator(model, toy_corpus, config)(params)
+    figures = evaluation.Validator(loop.training_model(config), toy_corpus, config)(load_run(toy_run).params)
     starts = evaluation.tiled_starts(toy_corpus, "validation", 16)
     assert len(starts) == 18
     body = toy_corpus.skeleton
