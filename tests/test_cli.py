@@ -25,7 +25,7 @@ from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.talker.recordings import talk
 from a2g_jax.training.run import load_run
 
-SMALL = ["--audio-channels", "8,8", "--motion-channels", "8,8", "--decoder-channels", "8,8", "--clip-frames", "16"]
+SMALL = ["--audio-channels", "8,8", "--motion-channels", "8", "--decoder-channels", "8", "--clip-frames", "16"]
 SMALL += ["--adversarial-steps", "0"]
 
 
