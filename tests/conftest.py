@@ -120,8 +120,21 @@ def toy_corpus(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def toy_run_config(toy_corpus):
-    """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings."""
+def shared_programs(toy_corpus):
+    """Trainings of Audio2Gestures on the toy corpus with one description share their compiled programs."""
+    from tests.shared_programs_for_tests import share_programs
+
+    with pytest.MonkeyPatch.context() as patch:
+        share_programs(patch, toy_corpus.fingerprint)
+        yield
+
+
+@pytest.fixture(scope="session")
+def toy_run_config(toy_corpus, shared_programs):
+    """A run of a very small Audio2Gestures on the toy corpus; keyword arguments change its training settings.
+
+    Its learning rate is constant, so that trainings of any number of steps have one program.
+    """
     import dataclasses
 
     from a2g_jax.models import find_model
@@ -132,7 +145,18 @@ def toy_run_config(toy_corpus):
     def make(**changes):
         model = dataclasses.replace(find_model("audio2gestures").presets["tiny"], **TOY_MODEL)
         settings = {"steps": 30, "batch_size": 4, "checkpoint_every": 10, "validate_every": 15, "log_every": 5}
-        training = dataclasses.replace(TRAIN_PRESETS["tiny"], **{**settings, **changes})
+        settings |= {"schedule": "constant", "warmup_steps": 2, "learning_rate": 3e-3, **changes}
+        training = dataclasses.replace(TRAIN_PRESETS["tiny"], **settings)
         return RunConfig.of("audio2gestures", "tiny", model, training, toy_corpus)
 
     return make
+
+
+@pytest.fixture(scope="session")
+def toy_run(toy_corpus, toy_run_config, tmp_path_factory):
+    """The folder of a run with the settings of ``toy_run_config()``; tests that change it copy it."""
+    from a2g_jax.training.loop import train
+
+    folder = tmp_path_factory.mktemp("toy_run") / "run"
+    train(toy_run_config(), toy_corpus, folder, resume=False, progress=False)
+    return folder

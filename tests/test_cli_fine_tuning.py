@@ -1,6 +1,7 @@
 """``a2g prepare --for`` and ``a2g train --from``: any rig at any rate, and what is refused."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -12,15 +13,13 @@ from a2g_jax.geometry.motion import resample
 from a2g_jax.io.audio import write_audio
 from a2g_jax.io.bvh import write_bvh
 from a2g_jax.talker.recordings import talk
-from a2g_jax.training.loop import train
 from a2g_jax.training.run import load_run
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory, toy_corpus, toy_run_config):
-    folder = tmp_path_factory.mktemp("source") / "run"
-    train(toy_run_config(steps=3), toy_corpus, folder, resume=False, progress=False)
-    return folder
+def source(tmp_path_factory, toy_run):
+    """A run of its own, as a test moves it."""
+    return shutil.copytree(toy_run, tmp_path_factory.mktemp("source") / "run")
 
 
 @pytest.fixture(scope="module")

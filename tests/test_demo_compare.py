@@ -15,7 +15,6 @@ from a2g_jax.generation.generator import Generator
 from a2g_jax.io.npz import read_motion_npz
 from a2g_jax.talker.demo_speech import demo_recording
 from a2g_jax.talker.recordings import talk
-from a2g_jax.training.loop import train
 from a2g_jax.training.run import open_run
 from a2g_jax.training.run_file import SHIPPED
 
@@ -52,8 +51,8 @@ def test_compare_shows_every_system_and_the_talker(tmp_path):
 
 
 @pytest.mark.slow
-def test_runs_of_ones_own_are_compared_too(tmp_path, toy_run_config, toy_corpus, capsys):
-    train(toy_run_config(steps=2), toy_corpus, tmp_path / "mine", resume=False, progress=False)
+def test_runs_of_ones_own_are_compared_too(tmp_path, toy_run, capsys):
+    shutil.copytree(toy_run, tmp_path / "mine")
     found = comparison.systems([str(tmp_path / "mine"), "demo"])
     assert list(found) == [*SHIPPED, "mine"]
     toys = dict.fromkeys(("one", "two-three"), found["mine"])
@@ -93,7 +92,7 @@ def test_requests_go_to_the_systems_that_have_the_control(monkeypatch, tmp_path,
     taken = {}
 
     class Still(Generator):
-        def __init__(self, run):
+        def __init__(self, run, like=None):
             taken[run.config.model] = getattr(run.config.sampling_settings, "controls", None)
             self.run = run
 

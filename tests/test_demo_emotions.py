@@ -49,7 +49,7 @@ def speech(tmp_path):
 class Still(Generator):
     """A generator that returns two seconds of the talker's motion, for tests of everything else."""
 
-    def __init__(self, run):
+    def __init__(self, run, like=None):
         self.run = run
 
     def stream(self, audio, samples, seed=0, **given):

@@ -14,7 +14,9 @@ def test_demo_trains(tmp_path, monkeypatch, capsys):
     entry = find_model("audio2gestures")
     # The preset's own structure: codes of training clips at a low rate, and two stages of training.
     changes = {"specific_frames": 4, "specific_jitter": 2, "smoothing": 2, "stored_codes": True, "adversarial_steps": 2}
-    toy = dataclasses.replace(entry.presets["tiny"], **{**TOY_MODEL, **changes, "discriminator_channels": (8, 8)})
+    # One block of each network: compiling is most of the time.
+    changes |= dict.fromkeys(("audio_channels", "motion_channels", "decoder_channels", "discriminator_channels"), (8,))
+    toy = dataclasses.replace(entry.presets["tiny"], **{**TOY_MODEL, **changes})
     monkeypatch.setitem(entry.presets, "tiny", toy)
     small = dataclasses.replace(entry.training["tiny"], steps=4, batch_size=2, checkpoint_every=3)
     monkeypatch.setitem(entry.training, "tiny", small)

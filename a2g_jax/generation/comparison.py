@@ -154,7 +154,12 @@ def compare(
         frames, body = max(sizes, key=lambda size: size[0] * size[1].joints)
         check_page_size(samples * len(runs) + 1, frames, body.joints)
     check_folder_writable(out)  # before any work
-    checked = {name: Checked(run, Generator(run), strict=strict) for name, run in runs.items()}
+    generators: dict[str, Generator] = {}
+    for name, run in runs.items():
+        # One run with several emotions is compiled once.
+        before = next((one for one in generators.values() if one.run.params is run.params), None)
+        generators[name] = Generator(run) if before is None else Generator(run, like=before)
+    checked = {name: Checked(run, generators[name], strict=strict) for name, run in runs.items()}
     motions = {
         name: _motions(name, each, audio[runs[name].config.mel.sample_rate], samples, seed, report)
         for name, each in checked.items()

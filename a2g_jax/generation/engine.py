@@ -1,6 +1,7 @@
 """The window loop: motions of any length from a model, window by window."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import fields
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,7 @@ from a2g_jax.generation.controls import check_rows, check_stored, stored_rows
 from a2g_jax.models.base import Condition, Model
 from a2g_jax.nn.blocks import BLOCK
 from a2g_jax.progress import checkpoint
-from a2g_jax.training.run import Run
+from a2g_jax.training.run import Run, RunConfig
 
 Rows = Float[np.ndarray, "T R D"]
 
@@ -49,10 +50,19 @@ class Engine:
     the same as from one pass over the whole audio. Before the first and after the last frame the audio is silent.
     """
 
-    def __init__(self, run: Run, window: int = WINDOW) -> None:
+    _params: Any
+    _summary: Any
+    _condition: Any
+    _sample: Any
+    _advance: Any
+    _begin: Any
+
+    def __init__(self, run: Run, window: int = WINDOW, like: "Engine | None" = None) -> None:
         """
         Args:
             window: frames of one call of a compiled function at most, a multiple of 128.
+            like: another engine, whose compiled functions serve this one if only requests differ
+                (:attr:`a2g_jax.models.base.Model.programs`).
 
         Raises:
             InputError: the run's model does not generate motion from audio.
@@ -62,15 +72,28 @@ class Engine:
         assert model.condition is not None
         assert model.sample is not None
         self.halo = -(-model.halo // BLOCK) * BLOCK
-        self._params = jax.device_put(run.params)
-        self._summary = jax.device_put(run.summary)
-        self._condition = jax.jit(model.condition)
         #: Requests of the sampling settings.
         self.lines: Sequence[str] = getattr(run.config.sampling_settings, "controls", ())
         if model.controls is not None and self.lines:
             check_stored(run, model.controls)
+        if like is not None and like._serves(self):
+            self._params, self._summary, self._condition = like._params, like._summary, like._condition
+            self._sample, self._advance, self._begin = like._sample, like._advance, like._begin
+            return
+        self._params = jax.device_put(run.params)
+        self._summary = jax.device_put(run.summary)
+        self._condition = jax.jit(model.condition)
         self._sample, self._advance = jax.jit(self.sample), jax.jit(self.advance)
         self._begin = None if model.begin is None else jax.jit(self.begin)
+
+    def _serves(self, other: "Engine") -> bool:
+        """Whether the functions of this engine compute what those of another one do."""
+        if self.model.programs is None or self.model.programs != other.model.programs or self.window != other.window:
+            return False
+        own, its = self.run, other.run
+        settings = (field.name for field in fields(RunConfig) if field.name != "sampling")
+        same = (getattr(own.config, name) is getattr(its.config, name) for name in settings)
+        return own.params is its.params and own.summary is its.summary and all(same)
 
     def sample(self, params, summary, key, condition, start) -> Any:
         """Poses (window, R, D) of a window of a model that is not autoregressive."""

@@ -47,16 +47,18 @@ class Generator:
         >>> calm = generator.generate(speech.audio, 1, noise_scale=0.5)
     """
 
-    def __init__(self, run: Run, window: int = WINDOW) -> None:
+    def __init__(self, run: Run, window: int = WINDOW, like: "Generator | None" = None) -> None:
         """
         Args:
             window: frames of one call of a compiled function, a multiple of 128.
+            like: a generator of the same run with other sampling settings; compiled functions that serve both are
+                shared.
 
         Raises:
             InputError: the run's model does not generate motion from audio.
         """
         self.run = run
-        self.engine = Engine(run, window)
+        self.engine: Engine = Engine(run, window, None if like is None else like.engine)
         self._changed: dict[Any, Generator] = {}
 
     def with_sampling(self, **sampling: Any) -> "Generator":
@@ -74,7 +76,7 @@ class Generator:
         if config.sampling not in self._changed:
             while len(self._changed) >= _KEPT:
                 del self._changed[next(iter(self._changed))]
-            self._changed[config.sampling] = Generator(replace(self.run, config=config), self.engine.window)
+            self._changed[config.sampling] = Generator(replace(self.run, config=config), self.engine.window, self)
         return self._changed[config.sampling]
 
     def frames(self, audio: Any, sample_rate: int | None = None) -> int:

@@ -213,6 +213,10 @@ class Model(NamedTuple):
     """Whether a shorter window gives other last bits of the same frames, so that the engine has to use one length for
     speech of any length."""
     controls: Controls | None = None
+    programs: Any = None
+    """Of models some of whose sampling settings are requests alone, which ``requested`` gives as conditioning: a value
+    that models of one run with other sampling settings have in common where ``condition``, ``begin``, ``proceed`` and
+    ``sample`` compute the same, so that their compiled programs serve all of them."""
 
     reconstruct: Callable[..., Array] | None = None
     """``reconstruct(params, batch) -> pose (B, T, R, D)``: through the latent space and back, without noise."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 from orbax.checkpoint import v1 as ocp
 
 from a2g_jax.errors import InputError
@@ -117,7 +118,21 @@ class Checkpoints:
                 f"{path}: cannot be resumed from ({first[:200]}); remove this folder to resume from the one before it,"
                 " or start again without --resume."
             ) from error
-        return TrainState(**tree)
+        return jax.tree.map(_placed, TrainState(**tree), like)
+
+
+def _placed(array: jax.Array, like: jax.Array) -> jax.Array:
+    """An array of a checkpoint, bound to a device only if the array in whose place it comes is.
+
+    Orbax binds all to one. JAX compiles other programs for bound arrays, so a run that resumes would compile anew what
+    it has in the compilation cache.
+    """
+    if like.committed:
+        return array
+    if jax.dtypes.issubdtype(array.dtype, jax.dtypes.prng_key):
+        data = _placed(jax.random.key_data(array), jax.random.key_data(like))
+        return jax.random.wrap_key_data(data, impl=jax.random.key_impl(like))
+    return jax.device_put(np.asarray(array))
 
 
 def _load(path: Path, like: TrainState) -> dict[str, Any]:

@@ -40,8 +40,7 @@ SMALL = {"channels": (16, 16), "hidden": 16, "width": 16, "layers": 2, "heads": 
     ("source", "encoder", "rate", "steps"),
     [
         ("motion", "convolutions", 5e-3, 120),
-        ("audio", "convolutions", 5e-3, 120),
-        ("motion", "attention", 2e-3, 200),
+        ("audio", "attention", 2e-3, 200),
     ],
 )
 def test_it_learns_emotions_from_its_input_only(source, encoder, rate, steps):

@@ -22,35 +22,71 @@ def test_there_are_notebooks():
 START, PATIENCE = 40, 240
 
 
-def executed(path, folder, stacks):
-    """The notebook with its outputs; where its threads are goes to a file, should a cell take too long."""
-    from jupyter_client import AsyncKernelManager
+#: What a notebook that is first in its kernel has: no variables, and its own working folder. Where its threads are goes
+#: to a file, should a cell take too long.
+FIRST = """
+get_ipython().run_line_magic("reset", "-f")
+import faulthandler, os
+os.chdir({folder!r})
+faulthandler.dump_traceback_later({seconds}, file=open({stacks!r}, "w"))
+del faulthandler, os
+"""
 
-    notebook = nbformat.read(path, as_version=4)
-    watch = f"import faulthandler\nfaulthandler.dump_traceback_later({PATIENCE - 10}, file=open({str(stacks)!r}, 'w'))"
-    notebook.cells.insert(0, nbformat.v4.new_code_cell(watch))
-    resources = {"metadata": {"path": str(folder)}}
+
+@pytest.fixture(scope="module")
+def new_kernel():
+    """A function that gives a kernel; it is started by the first notebook. All stop in the end."""
+    from jupyter_client import AsyncKernelManager
+    from nbclient.util import run_sync
+
     # Sockets are files: ports are chosen before they are bound, and other tests start kernels at the same time. Their
     # paths must be short.
     with tempfile.TemporaryDirectory() as sockets:
-        manager = AsyncKernelManager(kernel_name="python3", transport="ipc", ip=f"{sockets}/kernel")
-        client = nbclient.NotebookClient(notebook, km=manager, resources=resources)
-        client.timeout_func = lambda cell: START if cell is notebook.cells[0] else PATIENCE
+        kernels = []
+
+        def new():
+            where = f"{sockets}/kernel{len(kernels)}"
+            kernels.append(AsyncKernelManager(kernel_name="python3", transport="ipc", ip=where))
+            return kernels[-1]
+
+        yield new
+        for kernel in kernels:
+            if kernel.has_kernel:
+                run_sync(kernel.shutdown_kernel)(now=True)
+
+
+@pytest.fixture(scope="module")
+def kernel(new_kernel):
+    """One kernel for all notebooks: to import JAX and the package takes seconds."""
+    return new_kernel()
+
+
+def executed(path, folder, stacks, kernel):
+    """The notebook with its outputs."""
+    notebook = nbformat.read(path, as_version=4)
+    first = FIRST.format(folder=str(folder), stacks=str(stacks), seconds=PATIENCE - 10)
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(first))
+    client = nbclient.NotebookClient(notebook, km=kernel, resources={"metadata": {"path": str(folder)}})
+    client.timeout_func = lambda cell: START if cell is notebook.cells[0] else PATIENCE
+    try:
         client.execute()
+    finally:
+        if client.kc is not None:
+            client.kc.stop_channels()
     return notebook
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
-def test_runs(path, tmp_path):
+def test_runs(path, tmp_path, kernel, new_kernel):
     folder, stacks = tmp_path / "work", tmp_path / "stacks.txt"
     folder.mkdir()
     try:
-        notebook = executed(path, folder, stacks)
+        notebook = executed(path, folder, stacks, kernel)
     except nbclient.exceptions.CellTimeoutError as error:
         # Once in many runs a kernel no longer answered; a notebook that hangs twice is at fault itself.
         where = stacks.read_text() if stacks.exists() else "in the first cell"
         warnings.warn(f"{path.name} hung: {error}\n{where}", stacklevel=1)
-        notebook = executed(path, folder, stacks)
+        notebook = executed(path, folder, stacks, new_kernel())
     shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     pictures = [output for output in shown if "image/png" in output.get("data", {})]
     assert len(pictures) >= 4

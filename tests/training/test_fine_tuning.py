@@ -36,6 +36,7 @@ from a2g_jax.training.run import Run, load_run, open_run, save_run
 from a2g_jax.training.run_file import WEIGHTS_FILE
 
 NETWORKS = ("audio_encoder", "decoder", "mapping_net", "motion_encoder")
+FROZEN = ("audio_encoder", "motion_encoder")
 
 
 def equal_trees(first, second) -> bool:
@@ -43,14 +44,12 @@ def equal_trees(first, second) -> bool:
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory, toy_corpus, toy_run_config):
+def source(toy_run):
     """A run to start from."""
-    folder = tmp_path_factory.mktemp("source") / "run"
-    train(toy_run_config(steps=5), toy_corpus, folder, resume=False, progress=False)
-    return folder
+    return toy_run
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def tuned(source, toy_corpus):
     """A function of training settings: the description of a run that starts from the source, and its weights."""
 
@@ -63,16 +62,24 @@ def tuned(source, toy_corpus):
     return make
 
 
-def test_a_tuned_run_starts_from_the_weights_and_records_the_source(tmp_path, source, tuned, toy_corpus):
-    config, params = tuned(steps=1, learning_rate=1e-12)
-    run = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False, start=params)
+@pytest.fixture(scope="module")
+def tuned_run(tmp_path_factory, tuned, toy_corpus):
+    """A run of five steps in which both encoders are frozen, and its folder."""
+    config, params = tuned(steps=5, learning_rate=1e-3, frozen=FROZEN)
+    folder = tmp_path_factory.mktemp("tuned") / "run"
+    return train(config, toy_corpus, folder, resume=False, progress=False, start=params), folder
+
+
+def test_a_tuned_run_starts_from_the_weights_and_records_the_source(source, tuned_run, toy_corpus):
+    (run, folder), params = tuned_run, load_run(source).params
+    # Adam moves a weight by little more than the learning rate in each step.
     for ours, theirs in zip(jax.tree.leaves(run.params), jax.tree.leaves(params), strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-6)
-    again = load_run(tmp_path / "run").config
-    assert again.source == config.source
+        np.testing.assert_allclose(ours, theirs, atol=0.01)
+    again = load_run(folder).config
+    assert again.source == run.config.source
     assert again.source is not None
     assert again.source.run == str(source)
-    assert again.source.steps == 5
+    assert again.source.steps == 30
     assert len(again.source.weights) == 64
     assert again.source.corpus == toy_corpus.fingerprint
     # Codes of clips of several tilings, not of one.
@@ -173,13 +180,11 @@ def test_what_does_not_fit_is_refused_with_the_command(source, toy_corpus):
         tuned_config(start, wide, run.config.train_config, toy_corpus)
 
 
-def test_frozen_networks_do_not_move(tmp_path, tuned, toy_corpus):
-    config, params = tuned(steps=3, learning_rate=1e-2, frozen=("audio_encoder", "motion_encoder"))
-    run = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False, start=params)
+def test_frozen_networks_do_not_move(source, tuned_run):
+    run, params = tuned_run[0], load_run(source).params
     for name in NETWORKS:
-        same = equal_trees(run.params[name], params[name])
-        assert same == (name in config.train_config.frozen), name
-    model = config.build()
+        assert equal_trees(run.params[name], params[name]) == (name in FROZEN), name
+    model = run.config.build()
     with pytest.raises(InputError, match="no network 'encoder'; there are: audio_encoder"):
         without_frozen(model, ("encoder",))
     with pytest.raises(InputError, match="nothing to train"):
@@ -304,10 +309,9 @@ def test_no_gains_without_a_source_or_recordings(tuned, toy_run_config, toy_corp
     assert corpus_dynamics(model, config, params, {}, short) is None
 
 
-def test_motion_of_a_tuned_run_has_the_dynamics_of_the_recordings(tmp_path, tuned, toy_corpus):
+def test_motion_of_a_tuned_run_has_the_dynamics_of_the_recordings(tuned_run, toy_corpus):
     """Amplitude of motion for the speech of the recordings; that of the toy run is far from theirs."""
-    config, params = tuned(steps=5)
-    run = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False, start=params)
+    run, _ = tuned_run
     segment = toy_corpus.segments("train")[0]
     audio, pose = (np.asarray(toy_corpus.array(name)[segment.start : segment.stop]) for name in ("audio", "pose"))
     spread = {}

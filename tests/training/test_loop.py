@@ -19,8 +19,11 @@ from a2g_jax.geometry.kinematics import joint_positions
 from a2g_jax.geometry.rotation import matrix_from_6d
 from a2g_jax.training import loop
 from a2g_jax.training import validation as evaluation
+from a2g_jax.training.checkpoint import Checkpoints
 from a2g_jax.training.loop import Interrupted, TrainingError, train
 from a2g_jax.training.run import load_run, save_run
+from a2g_jax.training.stages import stage_spans
+from a2g_jax.training.state import init_state
 
 
 def equal_trees(first, second) -> bool:
@@ -32,30 +35,38 @@ def lines(folder, split):
     return [row for row in rows if row["split"] == split]
 
 
-def test_training_lowers_the_loss_and_writes_the_run(tmp_path, toy_corpus, toy_run_config):
-    config = toy_run_config(steps=120, checkpoint_every=60, validate_every=60)
-    run = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False)
-    losses = [row["loss"] for row in lines(tmp_path / "run", "train")]
-    assert np.mean(losses[-3:]) < 0.9 * losses[0]
-    assert len(lines(tmp_path / "run", "validation")) == 2
-    again = load_run(tmp_path / "run")
-    assert equal_trees(run.params, again.params)
-    assert again.steps == 120
-    assert again.config.model_config == config.model_config
-    assert set(again.summary) == {"specific_mean", "specific_std"}
-    assert len(again.summary["specific_mean"]) > 20
+def test_training_lowers_the_loss_and_writes_the_run(toy_run, toy_run_config):
+    losses = [row["loss"] for row in lines(toy_run, "train")]
+    assert losses[-1] < 0.9 * losses[0]
+    assert len(lines(toy_run, "validation")) == 2
+    run = load_run(toy_run)
+    assert run.steps == 30
+    assert run.config.model_config == toy_run_config().model_config
+    assert set(run.summary) == {"specific_mean", "specific_std"}
+    assert len(run.summary["specific_mean"]) > 20
 
 
 @pytest.mark.smoke
-def test_resuming_equals_not_having_stopped(tmp_path, toy_corpus, toy_run_config):
-    whole = train(toy_run_config(), toy_corpus, tmp_path / "whole", resume=False, progress=False)
+def test_resuming_equals_not_having_stopped(tmp_path, toy_corpus, toy_run, toy_run_config):
     # Interrupted between two checkpoints.
     half = tmp_path / "half"
     first = toy_run_config()
     stop_after(first, toy_corpus, half, 17)
     resumed = train(first, toy_corpus, half, resume=True, progress=False)
-    assert equal_trees(whole.params, resumed.params)
-    assert (half / "metrics.jsonl").read_text() == (tmp_path / "whole" / "metrics.jsonl").read_text()
+    assert equal_trees(load_run(toy_run).params, resumed.params)
+    # What a training returns is what it writes.
+    assert equal_trees(load_run(half).params, resumed.params)
+    assert (half / "metrics.jsonl").read_text() == (toy_run / "metrics.jsonl").read_text()
+
+
+def test_a_restored_state_is_bound_to_no_device(toy_run, toy_run_config):
+    """As a new one, so that a run that resumes finds its programs in the compilation cache."""
+    config = toy_run_config()
+    model = config.build()
+    new = init_state(model, stage_spans(model, config.train_config), seed=0)
+    restored = Checkpoints(toy_run / "checkpoints", 1).restore(new)
+    assert int(restored.step) == 30
+    assert not any(leaf.committed for state in (new, restored) for leaf in jax.tree.leaves(state))
 
 
 def stop_after(config, corpus, out, step):
@@ -75,12 +86,10 @@ def stop_after(config, corpus, out, step):
         loop.MetricsLog.tick = original
 
 
-def test_data_from_disk_gives_the_same_parameters(tmp_path, toy_corpus, toy_run_config):
-    on_device = train(toy_run_config(steps=10), toy_corpus, tmp_path / "a", resume=False, progress=False)
-    from_disk = train(
-        toy_run_config(steps=10, device_megabytes=0.0), toy_corpus, tmp_path / "b", resume=False, progress=False
-    )
-    for a, b in zip(jax.tree.leaves(on_device.params), jax.tree.leaves(from_disk.params), strict=True):
+def test_data_from_disk_gives_the_same_parameters(tmp_path, toy_corpus, toy_run, toy_run_config):
+    config = toy_run_config(device_megabytes=0.0)
+    from_disk = train(config, toy_corpus, tmp_path / "run", resume=False, progress=False)
+    for a, b in zip(jax.tree.leaves(load_run(toy_run).params), jax.tree.leaves(from_disk.params), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
 
 
@@ -94,22 +103,18 @@ def test_nan_stops_and_keeps_the_last_good_checkpoint(tmp_path, toy_corpus, toy_
         assert np.all(np.isfinite(leaf))
 
 
-def test_validation_counts_every_clip_once(tmp_path, toy_corpus, toy_run_config):
+def test_validation_counts_every_clip_once(toy_corpus, toy_run, toy_run_config):
     """18 clips are a full batch and a small one; their mean is that of single clips."""
     config = toy_run_config()
-    model = config.build()
-    params = jax.jit(model.init)(jax.random.key(0))
-    figures = evaluation.Validator(model, toy_corpus, config)(params)
+    figures = evaluation.Validator(loop.training_model(config), toy_corpus, config)(load_run(toy_run).params)
     starts = evaluation.tiled_starts(toy_corpus, "validation", 16)
     assert len(starts) == 18
-    single = []
+    body = toy_corpus.skeleton
+    joints = jax.jit(lambda pose: joint_positions(matrix_from_6d(pose), body.offsets, body.parents))
+    mean, single = joints(np.tile(toy_corpus.statistics["pose"].mean, (16, 1, 1))), []
     for start in starts:
-        pose = np.asarray(toy_corpus.pose[start : start + 16])
-        places = joint_positions(matrix_from_6d(pose), toy_corpus.skeleton.offsets, toy_corpus.skeleton.parents)
-        mean = joint_positions(
-            matrix_from_6d(toy_corpus.statistics["pose"].mean), toy_corpus.skeleton.offsets, toy_corpus.skeleton.parents
-        )
-        single.append(100 * np.linalg.norm(places - mean[None], axis=-1).mean())
+        places = joints(np.asarray(toy_corpus.pose[start : start + 16]))
+        single.append(100 * np.linalg.norm(places - mean, axis=-1).mean())
     assert figures["mean_pose_cm"] == pytest.approx(np.mean(single), rel=1e-4)
 
 
@@ -128,26 +133,17 @@ def test_a_run_that_never_got_to_a_checkpoint_can_be_started_again(tmp_path, toy
     assert load_run(out).steps == 5
 
 
-@pytest.fixture(scope="module")
-def five_steps(toy_corpus, toy_run_config, tmp_path_factory):
-    """The folder of a run of five steps, to be copied, and its configuration."""
-    folder = tmp_path_factory.mktemp("five_steps") / "run"
-    config = toy_run_config(steps=5, schedule="constant")
-    train(config, toy_corpus, folder, resume=False, progress=False)
-    return folder, config
-
-
-def test_folders_that_cannot_be_used(tmp_path, toy_corpus, toy_run_config, five_steps):
-    folder, config = five_steps
+def test_folders_that_cannot_be_used(tmp_path, toy_corpus, toy_run, toy_run_config):
+    config = toy_run_config()
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="not empty and holds no run"):
         train(config, toy_corpus, tmp_path / "other", resume=False, progress=False)
     with pytest.raises(InputError, match="holds a run already"):
-        train(config, toy_corpus, folder, resume=False, progress=False)
-    changed = toy_run_config(steps=9, learning_rate=0.01, schedule="constant")
-    with pytest.raises(InputError, match="learning_rate: 0.001, now 0.01"):
-        train(changed, toy_corpus, folder, resume=True, progress=False)
+        train(config, toy_corpus, toy_run, resume=False, progress=False)
+    changed = toy_run_config(steps=39, learning_rate=0.01)
+    with pytest.raises(InputError, match="learning_rate: 0.003, now 0.01"):
+        train(changed, toy_corpus, toy_run, resume=True, progress=False)
 
 
 def test_clips_longer_than_recordings(tmp_path, toy_corpus, toy_run_config):
@@ -158,18 +154,17 @@ def test_clips_longer_than_recordings(tmp_path, toy_corpus, toy_run_config):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, toy_corpus, five_steps):
-    original, config = five_steps
-    folder = shutil.copytree(original, tmp_path / "run")
-    for file in (folder / "checkpoints" / "5").rglob("*"):
+def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, toy_corpus, toy_run, toy_run_config):
+    folder = shutil.copytree(toy_run, tmp_path / "run")
+    for file in (folder / "checkpoints" / "30").rglob("*"):
         if file.is_file():
             file.write_bytes(b"\x80\x04nothing to see here")
-    with pytest.raises(InputError, match="checkpoints/5: cannot be resumed from"):
-        train(config, toy_corpus, folder, resume=True, progress=False)
+    with pytest.raises(InputError, match="checkpoints/30: cannot be resumed from"):
+        train(toy_run_config(), toy_corpus, folder, resume=True, progress=False)
 
 
-def test_damaged_runs(tmp_path, five_steps):
-    folder = shutil.copytree(five_steps[0], tmp_path / "run")
+def test_damaged_runs(tmp_path, toy_run):
+    folder = shutil.copytree(toy_run, tmp_path / "run")
     run = load_run(folder)
     weights = (folder / "weights.safetensors").read_bytes()
     for broken in (weights[: len(weights) // 2], b"", b"\x80\x04pickle", weights[:8] + b"x" * 100):

@@ -155,6 +155,8 @@ def build(config: EmotionGestureConfig, data: Data, sampling: EmotionGestureSamp
         # All chunks of a window are encoded together, and how XLA adds up products depends on their number.
         fixed_window=True,
         controls=controls,
+        # Named emotions are conditioning, as labels are.
+        programs=replace(sampling, emotion=LABEL if sampling.names_emotions else sampling.emotion, controls=()),
         reconstruct=reconstruct,
     )
 
