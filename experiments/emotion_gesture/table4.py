@@ -8,13 +8,15 @@ Without a corpus the table is rendered from the existing records.
 from dataclasses import replace
 from typing import Any
 
-from experiments.emotion_gesture.settings import FULL
+from experiments.emotion_gesture.settings import FULL, ours
 from experiments.emotion_gesture.table import Table, command
+from experiments.emotion_gesture.table3 import WHOLE
 from experiments.tables.claims import Claim
 from experiments.tables.runs import Variant
 
 LENGTHS = (2, 4, 6, 8, 10)
 ZERO, DUPLICATE, LONGEST = "zero", "duplicate", "L = 10"
+TINY_ZERO, TINY_DUPLICATE, TINY_PROMPTS = "tiny with zero", "tiny with duplicate", "tiny with L = 10"
 
 
 def _changed(**changes: Any) -> Variant:
@@ -22,10 +24,18 @@ def _changed(**changes: Any) -> Variant:
     return replace(FULL, changes={**FULL.changes, **changes})
 
 
+def _tiny(prompter: str) -> Variant:
+    """The preset with all steps of its main stage, without the stages of sampled features, which seams do not have."""
+    return replace(ours(prompter=prompter, seam_frames=0, vae_steps=0, sampled_steps=0), steps=WHOLE)
+
+
 VARIANTS = {
     ZERO: _changed(prompter="zero"),
     DUPLICATE: _changed(prompter="duplicate"),
     **{f"L = {frames}": _changed(transition_frames=frames) for frames in LENGTHS},
+    TINY_ZERO: _tiny("zero"),
+    TINY_DUPLICATE: _tiny("duplicate"),
+    TINY_PROMPTS: _tiny("spatial-temporal"),
 }
 
 CLAIMS = (
@@ -56,6 +66,15 @@ CLAIMS = (
         for what in ("speed", "jerk")
         for name in (ZERO, DUPLICATE)
     ),
+    *(
+        Claim(f"(ours) {text} than with {name}", TINY_PROMPTS, name, metric, -1)
+        for text, metric in (
+            ("the speed across the seam is closer to the truth's", "seam_speed_error"),
+            ("the jerk across the seam is closer to the truth's", "seam_jerk_error"),
+            ("L2 is lower", "position_l2"),
+        )
+        for name in (TINY_ZERO, TINY_DUPLICATE)
+    ),
 )
 
 PAPER = {
@@ -82,7 +101,8 @@ TABLE = Table(
     PAPER,
     (
         "Seams are as the decoder leaves them: no offset is faded out (`--seam-frames 0`). All rows add a share of the"
-        " last given pose to the output, whatever the prompt; without it rows of so few steps stay at the mean pose.",
+        " last given pose to the output, whatever the prompt; without it rows of so few steps stay at the mean pose. The"
+        " last three are the preset `tiny` with all steps of its main stage, without the stages of sampled features.",
     ),
     requests=False,
 )
