@@ -102,7 +102,7 @@ def emotion_on_request() -> list[str]:
     return [*lines, nulls(table, "requested_other_accuracy", (TRUTH,), 100)]
 
 
-def told_from_neutral() -> list[str]:
+def apart_from_neutral() -> list[str]:
     """Each emotion is classified as more probable than neutral in more than half of the clips."""
     table, lines = table3.TABLE.name, []
     for name in (table3.OURS, table3.OURS_LABEL, TRUTH):
@@ -172,7 +172,7 @@ def smooth_loss() -> list[str]:
 def seam() -> list[str]:
     """Prompts beat padding where the given poses end."""
     rows = (*table4.VARIANTS, HELD, MEAN)
-    lines = _claims(table4, ["the speed", "the jerk"])
+    lines = _claims(table4, [f"{whose}the {what}" for whose in ("", "(ours) ") for what in ("speed", "jerk")])
     return [
         *lines,
         *(
@@ -208,7 +208,7 @@ def _claims(module: Any, starts: Sequence[str] = ("",)) -> list[str]:
 SECTIONS: Mapping[str, Callable[[], list[str]]] = {
     "The emotion of the speech": emotion_of_the_speech,
     "Requested emotions": emotion_on_request,
-    "Each emotion beside neutral": told_from_neutral,
+    "Each emotion beside neutral": apart_from_neutral,
     "What beat and emotion features hold": probes,
     "Time in place, or in channels": header,
     "The motion-smooth loss": smooth_loss,
