@@ -102,7 +102,7 @@ TABLE = Table(
     (
         "Seams are as the decoder leaves them: no offset is faded out (`--seam-frames 0`). All rows add a share of the"
         " last given pose to the output, whatever the prompt; without it rows of so few steps stay at the mean pose."
-        " The last three are the preset `tiny` with all steps of its main stage, without the stages of sampled features.",
+        " The last three are the preset `tiny` with all steps of its main stage and without sampled features.",
     ),
     requests=False,
 )
