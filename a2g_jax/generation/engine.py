@@ -1,5 +1,6 @@
 """The window loop: motions of any length from a model, window by window."""
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from functools import partial
@@ -27,6 +28,9 @@ _LEAST = 2 * BLOCK
 #: Samples that an autoregressive model generates side by side: one reading of its weights serves all of them. Always as
 #: many, also for a single one, so that a sample does not depend on how many are requested.
 LANES = 4
+#: Windows that are computed while the caller works on those before them: enough to keep other cores busy, and few,
+#: since each takes the memory of a window.
+_AHEAD = 4
 #: Fields of a condition with a row for each frame.
 _BY_FRAME = ("emotion", "words", "controls", "latents")
 
@@ -132,18 +136,26 @@ class Engine:
         self._check(given)
         given = self._with_requests(given)
         frames, key = len(given.audio), jax.random.key(seed)
-        windows = self._windows(given)
+        windows = list(self._windows(given))
         if self._begin is not None:
-            yield from self._in_lanes(list(windows), key, samples, frames, self._seeds(given))
+            yield from self._in_lanes(windows, key, samples, frames, self._seeds(given))
             return
-        conditions = list(windows)
+        drawn = self._drawn(windows, key, samples)
+        for _ in range(samples):
+            parts = [np.asarray(next(drawn)) for _ in windows]
+            yield self.run.finished(np.concatenate(parts)[:frames])
+
+    def _drawn(self, windows: list[tuple[int, Any]], key: Any, samples: int) -> Iterator[Any]:
+        """Poses of every window of every sample, while those of the next windows are computed."""
+        pending: deque[Any] = deque()
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
-            parts = []
-            for start, condition in conditions:
+            for start, condition in windows:
                 checkpoint()
-                parts.append(np.asarray(draw(condition, jnp.int32(start))))
-            yield self.run.finished(np.concatenate(parts)[:frames])
+                pending.append(draw(condition, jnp.int32(start)))
+                if len(pending) > _AHEAD:
+                    yield pending.popleft()
+        yield from pending
 
     def _check(self, given: Condition) -> None:
         for name, value in given._asdict().items():

@@ -6,7 +6,7 @@ Hips and knees reach it by two-bone inverse kinematics, and the ankle keeps the 
 moves over to its own path within a fifth of a second.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -56,9 +56,9 @@ def lock_feet(motion: Motion) -> Motion:
     legs = find_legs(motion)
     if not legs or motion.frames < 2:
         return motion
-    places = motion.positions().astype(np.float64)
-    world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
-    return reach_goals(motion, {leg: _goal(places[:, leg.ankle], world[:, leg.ankle], motion.fps) for leg in legs})
+    places, world = motion.positions().astype(np.float64), _turned(motion, legs)
+    goals = {leg: _goal(places[:, leg.ankle], world[:, leg.ankle], motion.fps) for leg in legs}
+    return _reach_goals(motion, places, world, goals, None)
 
 
 def reach_goals(motion: Motion, goals: Mapping[Leg, Goal], lowering: Float[np.ndarray, " T"] | None = None) -> Motion:
@@ -68,8 +68,22 @@ def reach_goals(motion: Motion, goals: Mapping[Leg, Goal], lowering: Float[np.nd
         goals: for each leg, where its ankle goes and how it is turned in the world.
         lowering: share of that lowering in each frame; 1 by default.
     """
-    places = motion.positions().astype(np.float64)
-    world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
+    return _reach_goals(motion, motion.positions().astype(np.float64), _turned(motion, goals), goals, lowering)
+
+
+def _turned(motion: Motion, legs: Iterable[Leg]) -> Float[np.ndarray, "T J 3 3"]:
+    """Orientations in the world of the joints of legs; NaN for joints that are not above them."""
+    joints = [joint for leg in legs for joint in (leg.hip, leg.knee, leg.ankle)]
+    return world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents, joints)
+
+
+def _reach_goals(
+    motion: Motion,
+    places: Float[np.ndarray, "T J 3"],
+    world: Float[np.ndarray, "T J 3 3"],
+    goals: Mapping[Leg, Goal],
+    lowering: Float[np.ndarray, " T"] | None,
+) -> Motion:
     lower = np.zeros(motion.frames)
     for leg, (target, _) in goals.items():
         lower = np.maximum(lower, _too_far(places[:, leg.hip], target, _REACH * _length(motion, leg)))
@@ -88,7 +102,7 @@ def too_far(
 
 def knee_axis(motion: Motion, leg: Leg) -> Float[np.ndarray, "3"]:
     """Axis about which the knee of a leg bends in a motion, in the frame of the hip joint."""
-    world = world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents)
+    world = _turned(motion, [leg])
     offsets = np.asarray(motion.skeleton.offsets, np.float64)
     thigh, shin = world[:, leg.hip] @ offsets[leg.knee], world[:, leg.knee] @ offsets[leg.ankle]
     return _bend_axis(motion, world, leg, thigh, shin)
@@ -148,6 +162,7 @@ def _goal(
     """Where an ankle goes and how it is turned: its foothold while the foot stands, its own path in a step."""
     stands = ~steps(place, fps)
     target, turned, own = place.copy(), np.zeros_like(place), Rotation.from_matrix(world)
+    back = own.inv()
     edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
     for first, stop in edges.reshape(-1, 2):
         # Each foothold has a weight of its own, so that a short step passes from one to the next without a jump. They
@@ -155,9 +170,9 @@ def _goal(
         only = np.zeros(len(place), bool)
         only[first:stop] = True
         share = _weights(only, fps)[:, None]
-        foothold, turn = place[first:stop].mean(axis=0), Rotation.from_matrix(world[first:stop]).mean()
+        foothold, turn = place[first:stop].mean(axis=0), own[first:stop].mean()
         target += share * (foothold - place)
-        turned += share * (turn * own.inv()).as_rotvec()
+        turned += share * (turn * back).as_rotvec()
     return target, (Rotation.from_rotvec(turned) * own).as_matrix()
 
 

@@ -46,4 +46,4 @@ def case(seconds: float, seed: int = 0) -> Case:
     bins = config.window // 2 + 1
     flop = frames * (2.5 * config.window * 11 + 2.0 * bins * config.bands)
     moved = audio.nbytes + 4.0 * frames * config.bands
-    return Case(contenders, flop, moved, {"audio_s": seconds, "frames": frames})
+    return Case(contenders, flop, moved, about={"audio_s": seconds, "frames": frames})

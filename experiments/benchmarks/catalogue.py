@@ -58,7 +58,11 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "moglow-step": Benchmark(
         "training step of MoGlow, as published", "flow_training", _FLOW,
-        (Target("ratio", 1.5), Target("megabytes", 4000)), 2,
+        (Target("ratio", 1.5),), 2,
+    ),
+    "moglow-step-recompute": Benchmark(
+        "the same with `--recompute true`", "flow_training", {**_FLOW, "recompute": True},
+        (Target("megabytes", 4000),), 1,
     ),
     "moglow-step-8": Benchmark(
         "training step of MoGlow, 8 clips", "flow_training", {**_FLOW, "batch": 8}, (Target("ratio", 1.5),), 3
@@ -77,8 +81,16 @@ BENCHMARKS: dict[str, Benchmark] = {
     "generation-1": Benchmark(
         "1 sample of 5000 frames", "generation", {"samples": 1, "frames": 5000}, (Target("ratio", 1.5),)
     ),
+    "generation-1-unplanted": Benchmark(
+        "the same without planted feet, as the twin",
+        "generation", {"samples": 1, "frames": 5000, "planted": False}, (Target("ratio", 1.5),)
+    ),
     "generation-20": Benchmark(
         "20 samples of 5000 frames", "generation", {"samples": 20, "frames": 5000}, (Target("ratio", 2.0),), 3
+    ),
+    "generation-20-unplanted": Benchmark(
+        "the same without planted feet, as the twin",
+        "generation", {"samples": 20, "frames": 5000, "planted": False}, (Target("ratio", 2.0),), 3
     ),
     "generation-short": Benchmark("1 sample of 3 seconds", "generation", {"samples": 1, "frames": 90}, (), 10),
     "flow-sampling-1": Benchmark(

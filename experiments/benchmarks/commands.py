@@ -11,10 +11,10 @@ import tempfile
 import time
 from collections.abc import Callable, Collection
 from pathlib import Path
-from statistics import mean, median
+from statistics import median
 from typing import Any, NamedTuple
 
-from experiments.benchmarks.measure import Stopwatch, usable_cores
+from experiments.benchmarks.measure import Stopwatch, others_share, usable_cores
 from experiments.benchmarks.turns import clock
 
 
@@ -107,8 +107,7 @@ def take_commands(name: str, without: Collection[str], rounds: int) -> dict[str,
                     taken[key].append(turn)
     for key, turns in taken.items():
         rows[key] |= {field: median(turn[field] for turn in turns) for field in ("wall_s", "cpu_s", "peak_mb")}
-        shares = [turn["others"] for turn in turns if turn["others"] is not None]
-        rows[key]["others_share"] = mean(shares) if shares else None
+        rows[key]["others_share"] = others_share(turns)
         ours = taken[next(iter(own))]
         rows[key]["ratio"] = median(turn[which] / mine[which] for turn, mine in zip(turns, ours, strict=True))
     return {"rows": list(rows.values()), "floor": {"seconds": 0.0}, "about": {}}
@@ -137,7 +136,7 @@ def _run(command: Command, folder: Path) -> dict[str, Any]:
     if process.returncode != 0:
         last = (errors.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
         raise RuntimeError(f"{' '.join(command.arguments)}: {last}")
-    return {**_figures(time.perf_counter() - start, usage), "others": watch.others()}
+    return {**_figures(time.perf_counter() - start, usage), "others": watch.signed_others()}
 
 
 def _figures(wall: float, usage: resource.struct_rusage) -> dict[str, float]:

@@ -33,7 +33,7 @@ def case(name: str, sequences: int, frames: int, seed: int = 0) -> Case:
     }
     read = float(_bytes_of_a_frame(params)) * frames
     about = {"title": case.title, "sequences": sequences, "frames": frames, "audio_s": frames / case.fps}
-    return Case(contenders, read / 4 * 2 * sequences, read, about)
+    return Case(contenders, read / 4 * 2 * sequences, read=read, about=about)
 
 
 def _bound(sample: Callable[..., Any], z: Any, audio: Any) -> Call:
@@ -51,16 +51,19 @@ def _bytes_of_a_frame(params: Any) -> int:
 
 
 def _ours(networks: Any, params: Any) -> Callable[..., Any]:
+    from functools import partial
+
     import jax
     import numpy as np
 
+    from a2g_jax.models.stylized_flow.autoregression import proceed, start
+
     condition = jax.jit(networks.audio_context)
-    begin, proceed = jax.jit(networks.start, static_argnums=1), jax.jit(networks.proceed)
+    begin, onward = jax.jit(partial(start, networks), static_argnums=1), jax.jit(partial(proceed, networks))
 
     def sample(z: Any, audio: Any) -> Any:
-        state = begin(params, len(z))
-        x, _ = proceed(params, np.ascontiguousarray(z.swapaxes(0, 1)), condition(params, audio), state)
-        return np.asarray(x).swapaxes(0, 1)
+        latents, given = np.ascontiguousarray(z.swapaxes(0, 1)), condition(params, audio)
+        return np.asarray(onward(params, latents, given, begin(params, len(z)), np.int32(0))[0])
 
     return sample
 

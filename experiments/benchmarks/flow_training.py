@@ -12,12 +12,13 @@ from experiments.benchmarks.measure import load_torch
 from experiments.benchmarks.turns import Call, Case, product_flop
 
 
-def case(name: str, batch: int = 0, reverse: bool = False, seed: int = 0) -> Case:
+def case(name: str, batch: int = 0, reverse: bool = False, recompute: bool = False, seed: int = 0) -> Case:
     """The case of a model on a data set.
 
     Args:
         batch: clips; as published if 0.
         reverse: with the reverse pass.
+        recompute: the states of recurrent layers in the backward pass, by ours alone.
     """
     import jax
     import jax.numpy as jnp
@@ -29,7 +30,7 @@ def case(name: str, batch: int = 0, reverse: bool = False, seed: int = 0) -> Cas
     from experiments.benchmarks.flow_workload import CASES
 
     case = CASES[name]
-    config = replace(case.config, reverse_share=1.0 if reverse else 0.0)
+    config = replace(case.config, reverse_share=1.0 if reverse else 0.0, recompute=recompute)
     settings = find_model("stylized_flow").training_preset(case.preset)
     clips, rng = batch or case.batch, np.random.default_rng(seed)
     # Random walks, so that neighbouring frames are similar.
@@ -82,7 +83,8 @@ def _twin(case: Any, config: Any, settings: Any, pose: Any, audio: Any, seed: in
     twin = Twin(config, case.channels, case.bands)
     networks = FlowNetworks(config, case.data)
     # The actnorms set from the batch, as ours are.
-    params = networks.fitted(networks.init(jax.random.key(seed)), audio, networks.flat(pose))
+    fitted = jax.jit(lambda key, audio, pose: networks.fitted(networks.init(key), audio, networks.flat(pose)))
+    params = fitted(jax.random.key(seed), jax.device_put(audio), jax.device_put(pose))
     load_params(twin, params)
     del params
     adam = torch.optim.Adam(twin.parameters(), lr=settings.learning_rate / settings.warmup_steps, fused=True)

@@ -1,12 +1,12 @@
 """Generating motions with random weights: from mel features to the joint positions of every frame.
 
 Ours goes through ``Generator`` as a user's call does: in windows with context, and with the root path that plants the
-feet, which the twin omits. The twin takes the whole audio in one piece, and one sample after another. The audio is
-encoded once for all samples.
+feet and the legs that lock them, which the twin omits; ``planted=False`` omits both in ours too. The twin takes the
+whole audio in one piece, and one sample after another. The audio is encoded once for all samples.
 """
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,12 @@ from experiments.benchmarks.turns import Call, Case, product_flop
 _CLIPS = 64
 
 
-def case(samples: int, frames: int, seed: int = 0) -> Case:
-    """So many samples of so many frames, at 30 a second, with the preset ``paper`` on 22 joints."""
+def case(samples: int, frames: int, planted: bool = True, seed: int = 0) -> Case:
+    """So many samples of so many frames, at 30 a second, with the preset ``paper`` on 22 joints.
+
+    Args:
+        planted: whether ours plants and locks the feet.
+    """
     import numpy as np
 
     from experiments.benchmarks.workload import make_corpus, run_config
@@ -28,14 +32,14 @@ def case(samples: int, frames: int, seed: int = 0) -> Case:
         config = run_config(corpus, "paper", 1, 128, seed)
     features = np.random.default_rng(seed).normal(size=(frames, config.mel.width)).astype(np.float32)
     contenders: dict[str, Callable[[], Call]] = {
-        "a2g_jax": lambda: _ours(config, features, samples, seed),
+        "a2g_jax": lambda: _ours(config, features, samples, planted, seed),
         "torch_eager": lambda: _theirs(config, features, samples, seed, False),
         "torch_compiled": lambda: _theirs(config, features, samples, seed, True),
     }
     # Read once a sample: the features; written: the positions.
     written = 4.0 * samples * frames * 22 * 3
-    about = {"samples": samples, "frames": frames, "audio_s": frames / config.fps}
-    return Case(contenders, _flop(config, samples, frames), features.nbytes + written, about)
+    about = {"samples": samples, "frames": frames, "audio_s": frames / config.fps, "planted": planted}
+    return Case(contenders, _flop(config, samples, frames), features.nbytes + written, about=about)
 
 
 def _flop(config: Any, samples: int, frames: int) -> float:
@@ -52,11 +56,13 @@ def _flop(config: Any, samples: int, frames: int) -> float:
     return product_flop(lambda p: codec.encode_audio(p, audio), params) + samples * one
 
 
-def _ours(config: Any, features: Any, samples: int, seed: int) -> Call:
+def _ours(config: Any, features: Any, samples: int, planted: bool, seed: int) -> Call:
     import jax
     import numpy as np
 
     from a2g_jax.generation.generator import Generator
+    from a2g_jax.geometry.motion import Motion
+    from a2g_jax.geometry.pose_rows import rotations_from_rows
     from a2g_jax.training.run import Run
 
     rng, code = np.random.default_rng(seed), config.model_config.code_channels
@@ -66,8 +72,16 @@ def _ours(config: Any, features: Any, samples: int, seed: int) -> Call:
     }
     generator = Generator(Run(config, jax.jit(config.build().init)(jax.random.key(seed)), summary, 0))
 
+    def motions() -> Iterator[Any]:
+        if planted:
+            yield from generator.stream_features(features, samples, seed)
+            return
+        root = np.zeros((len(features), 3), np.float32)
+        for rows in generator.rows(features, samples, seed):
+            yield Motion(rotations_from_rows(rows, config.space.kind), root, config.skeleton, config.fps)
+
     def call() -> None:
-        for motion in generator.stream_features(features, samples, seed):
+        for motion in motions():
             motion.positions()
 
     return call

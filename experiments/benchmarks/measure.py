@@ -10,7 +10,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -92,11 +92,25 @@ class Stopwatch:
 
     def others(self) -> float | None:
         """Between 0 and 1."""
+        share = self.signed_others()
+        return None if share is None else max(0.0, share)
+
+    def signed_others(self) -> float | None:
+        """The same, below 0 where the system's clock ticks, 10 ms, are rounded so."""
         if not self._linux:
             return None
         wall, own = time.perf_counter() - self._wall, _own_seconds() - self._own
         busy = _busy_seconds(self._cores) - self._busy
-        return max(0.0, busy - own) / (wall * len(self._cores))
+        return (busy - own) / (wall * len(self._cores))
+
+
+def others_share(stretches: Iterable[Mapping[str, Any]]) -> float | None:
+    """Share of the cores that other processes took in several stretches, from ``others`` and ``wall_s`` of each: over
+    all of them, since that of a short one is rounded either way."""
+    known = [(one["others"], one["wall_s"]) for one in stretches if one["others"] is not None]
+    if not known:
+        return None
+    return max(0.0, sum(share * wall for share, wall in known) / sum(wall for _, wall in known))
 
 
 def measure(call: Callable[[], Any], repeats: int, warm_up: int = 2) -> dict[str, Any]:

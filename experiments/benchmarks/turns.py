@@ -5,20 +5,26 @@ thread, processor time is that of a quiet machine but for cold caches; with seve
 where other processes took little.
 """
 
+import math
 import statistics
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from experiments.benchmarks.measure import Stopwatch, keep_to_cores, peak_megabytes, usable_cores
+from experiments.benchmarks.measure import Stopwatch, keep_to_cores, others_share, peak_megabytes, usable_cores
 
 #: A call that waits for its results.
 Call = Callable[[], Any]
 #: Side of the matrices whose product gives the GEMM rate.
 _SIDE = 2048
-#: Bytes that are copied, far more than the caches hold.
+#: Bytes that are copied.
 _COPIED = 2**27
+#: Bytes that are read: about those of a published flow's weights, which a cache of many cores may hold.
+_READ = 2**28
+#: Length of a turn at least: shorter calls are made several times, since processes are told apart by ticks of 10 ms.
+_LEAST_SECONDS = 0.3
 
 
 class Case(NamedTuple):
@@ -30,6 +36,8 @@ class Case(NamedTuple):
     """Floating-point operations of all matrix products and convolutions."""
     moved: float = 0.0
     """Bytes that have to be read and written."""
+    read: float = 0.0
+    """Bytes that have to be read alone, such as weights."""
     about: Mapping[str, Any] = MappingProxyType({})
     """Further figures for the record, such as parameters."""
 
@@ -40,6 +48,7 @@ class Rates:
     def __init__(self) -> None:
         import jax
         import jax.numpy as jnp
+        import numpy as np
 
         matrix = jnp.ones((_SIDE, _SIDE))
         product = jax.jit(lambda a, b: a @ b)
@@ -49,13 +58,16 @@ class Rates:
             "gemm": lambda: jax.block_until_ready(product(matrix, matrix)),
             "copy": lambda: jax.block_until_ready(copy(array)),
         }
-        self._work = {"gemm": 2.0 * _SIDE**3, "copy": 2.0 * _COPIED}
+        parts = np.array_split(np.ones(_READ // 4, np.float32), usable_cores())
+        self._calls["read"] = lambda: list(self._readers.map(np.sum, parts))
+        self._readers = ThreadPoolExecutor(len(parts))
+        self._work = {"gemm": 2.0 * _SIDE**3, "copy": 2.0 * _COPIED, "read": float(_READ)}
         self._turns: dict[str, list[dict[str, float]]] = {name: [] for name in self._calls}
         for call in self._calls.values():
             call()
 
     def turn(self) -> None:
-        """Measure both once."""
+        """Measure all of them once."""
         for name, call in self._calls.items():
             self._turns[name].append(_turn(call))
 
@@ -75,8 +87,7 @@ def take_turns(case: Case, names: list[str], rounds: int) -> dict[str, Any]:
     for name in names:
         try:
             call = case.contenders[name]()
-            first = _turn(call)
-            call()
+            first, second = _turn(call), _turn(call)
         except (
             RuntimeError,
             ImportError,
@@ -85,25 +96,26 @@ def take_turns(case: Case, names: list[str], rounds: int) -> dict[str, Any]:
             message = (str(error).splitlines() or ["no message"])[0]
             rows[name] = {"contender": name, "failed": f"{type(error).__name__}: {message}"}
             continue
-        calls[name] = call
+        calls[name] = call, max(1, math.ceil(_LEAST_SECONDS / second["wall_s"]))
         rows[name] = {"contender": name, "first_wall_s": first["wall_s"], "first_cpu_s": first["cpu_s"]}
     taken: dict[str, list[dict[str, float]]] = {name: [] for name in calls}
     for _ in range(rounds):
-        for name, call in calls.items():
-            taken[name].append(_turn(call))
+        for name, (call, times) in calls.items():
+            taken[name].append(_turn(call, times))
         rates.turn()
     which, ours = clock(threads), next(iter(case.contenders))
     for name, turns in taken.items():
-        shares = [turn["others"] for turn in turns if turn["others"] is not None]
         rows[name] |= {field: _median(turns, field) for field in ("wall_s", "cpu_s")}
         rows[name] |= {"least_cpu_s": min(turn["cpu_s"] for turn in turns), "rounds": rounds}
-        rows[name]["others_share"] = statistics.mean(shares) if shares else None
+        rows[name]["others_share"] = others_share(turns)
         if ours in taken:
             pairs = zip(turns, taken[ours], strict=True)
             rows[name]["ratio"] = statistics.median(turn[which] / own[which] for turn, own in pairs)
     speeds = rates.rates(which)
-    floor = {"flop": case.flop, "bytes": case.moved, **{f"{name}_per_s": rate for name, rate in speeds.items()}}
-    floor["seconds"] = max(case.flop / speeds["gemm"], case.moved / speeds["copy"])
+    floor = {"flop": case.flop, "bytes": case.moved, "bytes_read": case.read}
+    floor |= {f"{name}_per_s": rate for name, rate in speeds.items()}
+    transfer = case.moved / speeds["copy"] + case.read / speeds["read"]
+    floor["seconds"] = max(case.flop / speeds["gemm"], transfer)
     return {"rows": list(rows.values()), "floor": floor, "about": dict(case.about)}
 
 
@@ -124,8 +136,6 @@ def product_flop(function: Callable[..., Any], *arguments: Any) -> float:
 
 
 def _flop(program: Any) -> float:
-    import math
-
     from jax.extend import core
 
     total = 0.0
@@ -148,12 +158,14 @@ def _flop(program: Any) -> float:
     return total
 
 
-def _turn(call: Call) -> dict[str, Any]:
+def _turn(call: Call, times: int = 1) -> dict[str, Any]:
+    """Seconds of a call, of several in a row."""
     keep_to_cores()
     watch, wall, used = Stopwatch(), time.perf_counter(), time.process_time()
-    call()
-    took = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - used}
-    return {**took, "others": watch.others()}
+    for _ in range(times):
+        call()
+    took = {"wall_s": (time.perf_counter() - wall) / times, "cpu_s": (time.process_time() - used) / times}
+    return {**took, "others": watch.signed_others()}
 
 
 def _median(turns: list[dict[str, float]], field: str) -> float:

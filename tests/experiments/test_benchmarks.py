@@ -3,6 +3,8 @@ are made again only where they are not complete."""
 
 import json
 import shlex
+import time
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -11,7 +13,7 @@ import pytest
 
 from experiments.benchmarks import commands, measure, turns
 from experiments.benchmarks.__main__ import made, main
-from experiments.benchmarks.catalogue import BENCHMARKS
+from experiments.benchmarks.catalogue import BENCHMARKS, Benchmark
 from experiments.benchmarks.table import table
 
 
@@ -36,7 +38,7 @@ def test_contenders_take_turns(monkeypatch):
             calls.append("rates")
 
         def rates(self, clock):
-            return {"gemm": 10.0, "copy": 4.0}
+            return {"gemm": 10.0, "copy": 4.0, "read": 2.0}
 
     def broken():
         raise RuntimeError("no compiler")
@@ -45,15 +47,30 @@ def test_contenders_take_turns(monkeypatch):
         raise RuntimeError
 
     monkeypatch.setattr(turns, "Rates", Rates)
+    monkeypatch.setattr(turns, "_LEAST_SECONDS", 0.0)
     contenders = {"a2g_jax": lambda: lambda: calls.append("ours"), "torch_eager": lambda: lambda: calls.append("eager")}
-    case = turns.Case({**contenders, "torch_compiled": broken, "torch_authors": silent}, flop=20.0, moved=4.0)
+    case = turns.Case({**contenders, "torch_compiled": broken, "torch_authors": silent}, flop=20.0, moved=4.0, read=4.0)
     found = turns.take_turns(case, list(case.contenders), 2)
     assert calls == ["ours"] * 2 + ["eager"] * 2 + ["ours", "eager", "rates"] * 2
-    assert found["floor"]["seconds"] == 2.0
+    assert found["floor"]["seconds"] == 3.0
     rows = {row["contender"]: row for row in found["rows"]}
     assert rows["a2g_jax"]["ratio"] == 1.0
     assert rows["torch_compiled"]["failed"] == "RuntimeError: no compiler"
     assert rows["torch_authors"]["failed"] == "RuntimeError: no message"
+
+
+def test_short_calls_are_made_several_times_a_turn():
+    calls, start = [], time.perf_counter()
+    turn = turns._turn(lambda: calls.append(time.sleep(0.01)), 5)
+    assert len(calls) == 5
+    assert 0.01 <= turn["wall_s"] <= (time.perf_counter() - start) / 5
+
+
+def test_rounding_of_short_stretches_is_not_other_work():
+    stretches = [{"others": share, "wall_s": 0.01} for share in (0.5, -0.5, 0.2, -0.2)]
+    assert measure.others_share(stretches) == 0.0
+    assert measure.others_share([*stretches, {"others": 0.5, "wall_s": 0.04}]) == pytest.approx(0.25)
+    assert measure.others_share([{"others": None, "wall_s": 1.0}]) is None
 
 
 def test_the_table_judges_targets():
@@ -148,6 +165,34 @@ def test_a_command_that_fails_without_a_message(tmp_path):
 def test_ours_of_a_case_runs(name):
     case = BENCHMARKS[name].case()
     case.contenders["a2g_jax"]()()
+
+
+@pytest.fixture
+def small_flows(monkeypatch):
+    """The flow's presets at a size that compiles in seconds, with all of their parts."""
+    pytest.importorskip("torch")
+    from experiments.benchmarks import flow_workload
+
+    sizes = {"flow_steps": 2, "hidden": 8, "history_frames": 3, "lookahead_frames": 2, "clip_frames": 8}
+    presets = {}
+    for name in {case.preset for case in flow_workload.CASES.values()}:
+        config = flow_workload.PRESETS[name]
+        widths = {"global_channels": 4, "encoder_channels": 6, "encoder_blocks": 1, "embedding_channels": 5}
+        presets[name] = replace(config, **sizes, **(widths if config.global_channels else {}))
+    monkeypatch.setattr(flow_workload, "PRESETS", presets)
+
+
+@pytest.mark.parametrize(
+    ("module", "settings"),
+    [
+        ("flow_training", {"name": "trinity", "batch": 2, "reverse": True}),
+        ("flow_sampling", {"name": "moglow", "sequences": 2, "frames": 3}),
+        ("flow_sampling", {"name": "trinity", "sequences": 2, "frames": 3}),
+    ],
+)
+def test_contenders_of_the_flow_run(small_flows, module, settings):
+    for start in Benchmark("", module, settings).case().contenders.values():
+        start()()
 
 
 def test_the_authors_kinematics_is_ours_on_all_joints():

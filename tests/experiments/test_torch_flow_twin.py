@@ -29,6 +29,9 @@ CONFIGS = {
     "gru, global encoder": StylizedFlowConfig(
         **SMALL, global_channels=4, encoder_channels=6, encoder_blocks=2, embedding_channels=5
     ),
+    "gru, normalised strides": StylizedFlowConfig(
+        **SMALL, global_channels=4, encoder_channels=6, encoder_blocks=2, embedding_channels=5, strided_norm=True
+    ),
     "lstm": StylizedFlowConfig(**SMALL, cell="lstm", freedom=0.0, global_channels=0, exact_identity=True),
 }
 

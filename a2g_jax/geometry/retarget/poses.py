@@ -4,6 +4,8 @@ Every rig has its own tree, so a compiled kernel would be recompiled for every r
 than it saves.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from jaxtyping import Float
 
@@ -14,14 +16,30 @@ Matrix = Float[np.ndarray, "*batch 3 3"]
 
 
 def world_rotations(
-    rotations: Float[np.ndarray, "*t J 3 3"], parents: tuple[int, ...]
+    rotations: Float[np.ndarray, "*t J 3 3"], parents: tuple[int, ...], only: Iterable[int] | None = None
 ) -> Float[np.ndarray, "*t J 3 3"]:
-    """Orientation of every joint in the world from local rotations."""
+    """Orientation of every joint in the world from local rotations.
+
+    Args:
+        only: joints of which it is needed; NaN for all that are neither among them nor above them. All if None.
+    """
+    needed = set(range(len(parents))) if only is None else _with_parents(only, parents)
     world = np.array(rotations)
+    if len(needed) < len(parents):
+        world[..., [joint for joint in range(len(parents)) if joint not in needed], :, :] = np.nan
     for level in tree_levels(parents)[1:]:
-        joints = list(level)
+        joints = [joint for joint in level if joint in needed]
         world[..., joints, :, :] = world[..., [parents[j] for j in joints], :, :] @ world[..., joints, :, :]
     return world
+
+
+def _with_parents(joints: Iterable[int], parents: tuple[int, ...]) -> set[int]:
+    found: set[int] = set()
+    for joint in joints:
+        while joint >= 0 and joint not in found:
+            found.add(joint)
+            joint = parents[joint]
+    return found
 
 
 def joint_places(
