@@ -146,7 +146,8 @@ class Engine:
             yield self.run.finished(np.concatenate(parts)[:frames])
 
     def _drawn(self, windows: list[tuple[int, Any]], key: Any, samples: int) -> Iterator[Any]:
-        """Poses of every window of every sample, while those of the next windows are computed."""
+        """Poses of every window of every sample; the next :data:`_AHEAD` windows are computed meanwhile, in vain if the
+        caller stops."""
         pending: deque[Any] = deque()
         for number in range(samples):
             draw = partial(self._sample, self._params, self._summary, jax.random.fold_in(key, number))
@@ -155,7 +156,9 @@ class Engine:
                 pending.append(draw(condition, jnp.int32(start)))
                 if len(pending) > _AHEAD:
                     yield pending.popleft()
-        yield from pending
+        while pending:
+            checkpoint()
+            yield pending.popleft()
 
     def _check(self, given: Condition) -> None:
         for name, value in given._asdict().items():

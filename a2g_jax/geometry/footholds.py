@@ -56,7 +56,7 @@ def lock_feet(motion: Motion) -> Motion:
     legs = find_legs(motion)
     if not legs or motion.frames < 2:
         return motion
-    places, world = motion.positions().astype(np.float64), _turned(motion, legs)
+    places, world = motion.positions().astype(np.float64), _leg_orientations(motion, legs)
     goals = {leg: _goal(places[:, leg.ankle], world[:, leg.ankle], motion.fps) for leg in legs}
     return _reach_goals(motion, places, world, goals, None)
 
@@ -68,11 +68,13 @@ def reach_goals(motion: Motion, goals: Mapping[Leg, Goal], lowering: Float[np.nd
         goals: for each leg, where its ankle goes and how it is turned in the world.
         lowering: share of that lowering in each frame; 1 by default.
     """
-    return _reach_goals(motion, motion.positions().astype(np.float64), _turned(motion, goals), goals, lowering)
+    return _reach_goals(
+        motion, motion.positions().astype(np.float64), _leg_orientations(motion, goals), goals, lowering
+    )
 
 
-def _turned(motion: Motion, legs: Iterable[Leg]) -> Float[np.ndarray, "T J 3 3"]:
-    """Orientations in the world of the joints of legs; NaN for joints that are not above them."""
+def _leg_orientations(motion: Motion, legs: Iterable[Leg]) -> Float[np.ndarray, "T J 3 3"]:
+    """World orientations of the joints of legs and of all above them; NaN for the other joints."""
     joints = [joint for leg in legs for joint in (leg.hip, leg.knee, leg.ankle)]
     return world_rotations(np.asarray(motion.rotations, np.float64), motion.skeleton.parents, joints)
 
@@ -102,7 +104,7 @@ def too_far(
 
 def knee_axis(motion: Motion, leg: Leg) -> Float[np.ndarray, "3"]:
     """Axis about which the knee of a leg bends in a motion, in the frame of the hip joint."""
-    world = _turned(motion, [leg])
+    world = _leg_orientations(motion, [leg])
     offsets = np.asarray(motion.skeleton.offsets, np.float64)
     thigh, shin = world[:, leg.hip] @ offsets[leg.knee], world[:, leg.knee] @ offsets[leg.ankle]
     return _bend_axis(motion, world, leg, thigh, shin)

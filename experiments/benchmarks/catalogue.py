@@ -62,7 +62,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "moglow-step-recompute": Benchmark(
         "the same with `--recompute true`", "flow_training", {**_FLOW, "recompute": True},
-        (Target("megabytes", 4000),), 1,
+        (Target("megabytes", 4000),), 2,
     ),
     "moglow-step-8": Benchmark(
         "training step of MoGlow, 8 clips", "flow_training", {**_FLOW, "batch": 8}, (Target("ratio", 1.5),), 3

@@ -91,12 +91,12 @@ class Stopwatch:
         self._busy = _busy_seconds(self._cores) if self._linux else 0.0
 
     def others(self) -> float | None:
-        """Between 0 and 1."""
+        """The share, 0 to 1."""
         share = self.signed_others()
         return None if share is None else max(0.0, share)
 
     def signed_others(self) -> float | None:
-        """The same, below 0 where the system's clock ticks, 10 ms, are rounded so."""
+        """The share, or a little below 0: times in /proc/stat are rounded to ticks of 10 ms."""
         if not self._linux:
             return None
         wall, own = time.perf_counter() - self._wall, _own_seconds() - self._own

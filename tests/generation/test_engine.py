@@ -2,12 +2,14 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from a2g_jax.errors import Interrupted
 from a2g_jax.features.dynamics import EDGES, Dynamics
+from a2g_jax.generation import engine as engine_module
 from a2g_jax.generation.engine import Engine
 from a2g_jax.geometry.pose_space import PoseSpace
 from a2g_jax.models.base import Condition, Model, Stage, Update
@@ -88,6 +90,33 @@ def test_generation_ends_between_windows_where_a_watcher_raises(toy_run_config, 
         list(engine.rows(given, 5))
     assert len(drawn) == 2
     assert len(list(engine.rows(given, 1))) == 1
+
+
+def test_samples_are_the_same_whatever_their_number_and_few_windows_are_ahead(toy_run_config, monkeypatch):
+    monkeypatch.setattr(RunConfig, "build", lambda config: recorder(config.space)._replace(seed_frames=0))
+    config = toy_run_config()
+    engine, drawn = Engine(Run(config, {}, {}, 0), 128), []
+
+    def sample(params, summary, key, given, start):
+        drawn.append(int(start))
+        number = float(jax.random.uniform(key)) + int(start)
+        return np.full((128, *config.space.shape), number, np.float32)
+
+    monkeypatch.setattr(engine, "_condition", lambda *_: None)
+    monkeypatch.setattr(engine, "_sample", sample)
+    given = Condition(audio=np.zeros((FRAMES, config.mel.width), np.float32))
+    stream = engine.rows(given, 4)
+    first = next(stream)
+    assert 3 <= len(drawn) <= 3 + engine_module._AHEAD
+    rest = list(stream)
+    # Three windows of each of four samples, each drawn once.
+    starts = [start - drawn[0] for start in drawn]
+    assert starts == [0, 128, 256] * 4
+    assert len({float(rows[0, 0, 0]) for rows in (first, *rest)}) == 4
+    for rows in (first, *rest):
+        np.testing.assert_allclose(rows[128::128, 0, 0] - rows[:-128:128, 0, 0], 128.0, atol=1e-3)
+    np.testing.assert_array_equal(next(engine.rows(given, 1)), first)
+    np.testing.assert_array_equal(list(engine.rows(given, 3))[2], rest[1])
 
 
 def test_gains_of_a_run_act_on_the_whole_motion(toy_run_config, monkeypatch):

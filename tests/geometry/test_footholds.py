@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from a2g_jax.geometry.body_joints import find_body_joints
 from a2g_jax.geometry.footholds import _goal, lock_feet
 from a2g_jax.geometry.motion import Motion
+from a2g_jax.geometry.retarget.poses import world_rotations
 from a2g_jax.geometry.skeleton import BODY_JOINTS, Skeleton
 from a2g_jax.talker.recordings import talk
 
@@ -35,6 +36,16 @@ def shaken(motion, degrees, seed=0):
 
 def speeds(motion):
     return np.linalg.norm(np.diff(motion.positions()[:, FEET], axis=0), axis=-1) * motion.fps
+
+
+def test_orientations_of_some_joints_are_those_of_all(still):
+    rotations, parents = still.rotations[:5], still.skeleton.parents
+    whole, part = world_rotations(rotations, parents), world_rotations(rotations, parents, [LEGS[2]])
+    above = {LEGS[2]}
+    while parents[min(above)] >= 0:
+        above.add(parents[min(above)])
+    np.testing.assert_array_equal(part[:, sorted(above)], whole[:, sorted(above)])
+    assert np.isnan(part[:, [joint for joint in range(len(parents)) if joint not in above]]).all()
 
 
 def test_feet_that_slide_stand(still):

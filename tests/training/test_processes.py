@@ -92,11 +92,15 @@ def test_eight_devices_train_as_one(tmp_path, emotional_corpus, family):
     settings = settings_of(family)
     end(begin(tmp_path / "one", emotional_corpus, settings))
     end(begin(tmp_path / "eight", emotional_corpus, settings, devices=8))
-    np.testing.assert_allclose(losses(tmp_path / "eight"), losses(tmp_path / "one"), rtol=TOLERANCE)
+    tolerance = ADVERSARIAL_TOLERANCE if family == "speech2gesture" else TOLERANCE
+    np.testing.assert_allclose(losses(tmp_path / "eight"), losses(tmp_path / "one"), rtol=tolerance)
 
 
 #: Relative difference of losses over the steps of these tests.
 TOLERANCE = 1e-4
+#: The same of a discriminator and a generator from their first step: Adam's first steps are signs of gradients, which of
+#: gradients near zero are signs of their rounding.
+ADVERSARIAL_TOLERANCE = 1e-3
 
 
 def back_to(folder, target, step):
