@@ -98,8 +98,8 @@ def test_eight_devices_train_as_one(tmp_path, emotional_corpus, family):
 
 #: Relative difference of losses over the steps of these tests.
 TOLERANCE = 1e-4
-#: The same of a discriminator and a generator from their first step: Adam's first steps are signs of gradients, which of
-#: gradients near zero are signs of their rounding.
+#: The same of a discriminator and a generator from their first step: the first steps of Adam are signs of gradients,
+#: which near zero are signs of their rounding.
 ADVERSARIAL_TOLERANCE = 1e-3
 
 
