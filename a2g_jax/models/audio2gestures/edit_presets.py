@@ -1,19 +1,19 @@
 """Edits of DCT bands by plain names, such as ``calmer``.
 
-Effects with the run ``demo``, mean of three speeches of 8 s; unedited, wrists move at 0.42 m/s in a box of 0.31 m a
-side, with a jerk (90th percentile) of 172 m/s3:
+Effects with the run ``demo``, mean of 16 speeches of 16 s (``python -m experiments.latent_edits``); unedited, wrists
+move at 0.32 m/s in a box of 0.27 m a side, with a jerk (90th percentile) of 161 m/s3:
 
 =================  ==========  ======  ==========
 name               speed, m/s  box, m  jerk, m/s3
 =================  ==========  ======  ==========
-calmer                   0.30    0.21         114
-livelier                 0.52    0.39         214
-smaller                  0.18    0.12          83
-larger                   0.58    0.42         249
-smoother                 0.34    0.30          52
-slower sway              0.20    0.25          31
-one posture              0.34    0.16         187
-without speech           0.27    0.29          27
+calmer                   0.22    0.20         100
+livelier                 0.40    0.32         227
+smaller                  0.14    0.10          72
+larger                   0.44    0.36         225
+smoother                 0.27    0.26          51
+slower sway              0.16    0.24          32
+one posture              0.24    0.15         204
+without speech           0.23    0.26          25
 =================  ==========  ======  ==========
 """
 
