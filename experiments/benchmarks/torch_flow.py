@@ -99,32 +99,28 @@ class Step(nn.Module):
 
 
 class WindowEncoder(nn.Module):
-    """Embedding of a stretch (B, C, T), averaged over time; parts have the names of Flax, which counts normalisations
-    in the order of their use."""
+    """Embedding of a stretch (B, C, T), averaged over time; parts have the names of Flax, in the order of their use."""
 
     def __init__(self, config: StylizedFlowConfig, inputs: int) -> None:
         super().__init__()
-        width, self.blocks = config.encoder_channels, config.encoder_blocks
+        width, self.blocks, self.normed = config.encoder_channels, config.encoder_blocks, int(config.strided_norm)
         self.StridedConv1D_0 = Conv(inputs, width, 4)
         for block in range(self.blocks):
             self.add_module(f"Conv1D_{block}", Conv(width, width, 3))
         self.StridedConv1D_1 = Conv(width, config.embedding_channels, 4)
-        after = (width, config.embedding_channels) if config.strided_norm else ()
-        widths = [*after[:1], *[width] * self.blocks, *after[1:]]
+        widths = [width] * (self.normed + self.blocks) + [config.embedding_channels] * self.normed
         for number, channels in enumerate(widths):
             self.add_module(f"LayerNorm_{number}", LayerNorm(channels))
-        self._norms = [f"LayerNorm_{number}" for number in range(len(widths))]
-        self._strided_norm = config.strided_norm
 
     def forward(self, x: Tensor) -> Tensor:
-        norms = [getattr(self, name) for name in self._norms]
-        x = _halve(self.StridedConv1D_0, x)
-        if self._strided_norm:
-            x = torch.relu(norms.pop(0)(x))
+        x = self._after(0, _halve(self.StridedConv1D_0, x))
         for block in range(self.blocks):
-            x = torch.relu(x + norms.pop(0)(getattr(self, f"Conv1D_{block}")(x)))
-        x = _halve(self.StridedConv1D_1, x)
-        return (torch.relu(norms.pop(0)(x)) if self._strided_norm else x).mean(-1)
+            norm = getattr(self, f"LayerNorm_{block + self.normed}")
+            x = torch.relu(x + norm(getattr(self, f"Conv1D_{block}")(x)))
+        return self._after(self.blocks + 1, _halve(self.StridedConv1D_1, x)).mean(-1)
+
+    def _after(self, number: int, x: Tensor) -> Tensor:
+        return torch.relu(getattr(self, f"LayerNorm_{number}")(x)) if self.normed else x
 
 
 def _halve(conv: Conv, x: Tensor) -> Tensor:

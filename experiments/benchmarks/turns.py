@@ -23,7 +23,8 @@ _SIDE = 2048
 _COPIED = 2**27
 #: Bytes that are read: about those of a published flow's weights, which a cache of many cores may hold.
 _READ = 2**28
-#: Length of a turn at least: shorter calls are made several times, since processes are told apart by ticks of 10 ms.
+#: Length of a turn at least, seconds: shorter calls are made several times, since the system counts processor time of
+#: other processes in ticks of 10 ms.
 _LEAST_SECONDS = 0.3
 
 
