@@ -69,13 +69,13 @@ def test_truth_is_that_of_the_motion(written, recording):
     assert truth["key"] is None
     assert truth["gestures"] == json.loads(json.dumps(recording.annotations["gestures"]))
     for number in (1, 2):
-        told = read_json(written / f"truth_{number:02d}.json")
-        key = jax.random.fold_in(jax.random.key(told["key"]["seed"]), told["key"]["fold"])
+        stored = read_json(written / f"truth_{number:02d}.json")
+        key = jax.random.fold_in(jax.random.key(stored["key"]["seed"]), stored["key"]["fold"])
         motion, drawn = resample_motion(recording, key)
-        assert truth_from_json(told["gestures"]) == drawn
+        assert truth_from_json(stored["gestures"]) == drawn
         np.testing.assert_array_equal(read_motion_npz(written / f"motion_{number:02d}.npz").rotations, motion.rotations)
-        assert told["frames"] == motion.frames
-        assert told["style"]["two_handed"] >= 0
+        assert stored["frames"] == motion.frames
+        assert stored["style"]["two_handed"] >= 0
 
 
 def test_same_arguments_same_bytes_and_only_own_files_are_replaced(written, tmp_path):

@@ -85,9 +85,9 @@ def continued(bench: Bench, requests: bool) -> Callable[[str, Run, Ruler, int], 
         found = scores_of(bench.generate(run, ruler.samples, seed), bench, seed)
         found["scores"] |= of_other_speech(run, bench, seed)
         if requests and ruler.judge is not None and takes_requests(run):
-            asked = requested(run, bench, seed)
-            found["scores"] |= asked["scores"]
-            found["requests"] = asked["requests"]
+            of_requests = requested(run, bench, seed)
+            found["scores"] |= of_requests["scores"]
+            found["requests"] = of_requests["requests"]
         return {**found, "score_cpu_seconds": time.process_time() - began}
 
     return score
@@ -116,9 +116,9 @@ def score_nulls(table: Table, bench: Bench, measured: Mapping[str, Any], seeds: 
                 continue
             record = {**fields, "unit": bench.corpus.space.unit, **scores_of(made, bench, seed)}
             if name == TRUTH and bench.ruler.judge is not None and bench.corpus.recipe.get("reader") == "talker":
-                asked = true_emotions(bench)
-                record["scores"] |= asked["scores"]
-                record["requests"] = asked["requests"]
+                of_requests = true_emotions(bench)
+                record["scores"] |= of_requests["scores"]
+                record["requests"] = of_requests["requests"]
             append(table.name, record)
 
 

@@ -139,7 +139,7 @@ def test_timing_of_a_small_recording():
     assert np.nanmax(np.abs(np.subtract(rows["peak"], rows["planned_peak"]))) < 0.05
     found = timing.against_shifts([rows], "planned_apex", "planned_peak", 100, 0)
     assert found["share"] > found["null_95"][1]
-    # Times that have nothing to do with each other are not told from shifted ones.
+    # Times that have nothing to do with each other do not differ from shifted ones.
     rng = np.random.default_rng(0)
     loose = {"a": rng.uniform(0, 600, 300).tolist(), "b": rng.uniform(0, 600, 300).tolist(), "seconds": [600.0]}
     assert abs(timing.against_shifts([loose], "a", "b", 100, 0)["z"]) < 3.5
@@ -263,9 +263,9 @@ def test_emotions_judged_shown_and_drawn(tmp_path):
         blind = emotions.judge(noise, labels, classes, name, 0)
         assert blind["interval"][0] < 1 / 8 + 0.05
         assert np.sum(blind["confusion"]) == 80
-    heard, seen = emotions.features({**ROLE, "room": True})
-    assert np.isfinite(heard).all()
-    assert np.isfinite(seen).all()
+    audio, gestures = emotions.features({**ROLE, "room": True})
+    assert np.isfinite(audio).all()
+    assert np.isfinite(gestures).all()
     result = {"recordings": 80, "seconds": 1.0, "features": {"audio": 1, "motion": 1}, "folds": 5}
     for what, names in emotions.LABELS.items():
         for sense in ("audio", "motion"):

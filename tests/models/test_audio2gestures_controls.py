@@ -167,12 +167,12 @@ def test_the_gain_of_an_emotion_moves_codes_away_from_the_mean_of_all():
     expected = codes[np.asarray(SUMMARY[LABELS]) == 1].mean(axis=0) - codes.mean(axis=0)
     for gain in (1.5, 3.0):
         sampling = replace(SAMPLING, control_gains=(f"{EMOTION}={gain}",))
-        asked = request(NAMES, sampling, summary, controls)
-        np.testing.assert_allclose(asked.shift[:32], 0.0)
-        np.testing.assert_allclose(asked.shift[32:], np.tile((gain - 1.0) * expected, (32, 1)), rtol=1e-3)
-        moved = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, *asked)
-        plain = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, asked.weights)
-        np.testing.assert_allclose(moved - plain, jnp.repeat(asked.shift, HOLD // SIZE, axis=0), atol=1e-2)
+        requested = request(NAMES, sampling, summary, controls)
+        np.testing.assert_allclose(requested.shift[:32], 0.0)
+        np.testing.assert_allclose(requested.shift[32:], np.tile((gain - 1.0) * expected, (32, 1)), rtol=1e-3)
+        moved = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, *requested)
+        plain = stored_steps(KEY, CODES, sampling, jnp.int32(0), 256, SIZE, requested.weights)
+        np.testing.assert_allclose(moved - plain, jnp.repeat(requested.shift, HOLD // SIZE, axis=0), atol=1e-2)
     assert request(NAMES, SAMPLING, summary, controls).shift is None
 
 

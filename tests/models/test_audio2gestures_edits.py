@@ -84,17 +84,17 @@ def test_scale_and_zero_one_after_another():
 
 @pytest.mark.parametrize("line", ["specific swap 1:4", "specific sample 1:4 9"])
 def test_bands_from_another_code(line):
-    asked = []
+    values = []
 
     def other(edit):
-        asked.append(edit.value)
+        values.append(edit.value)
         return OTHER
 
     after = bands(apply_edits(CODE, [parse_edit(line, POINTS)], POINTS, other))
     expected = bands(CODE).copy()
     expected[:, :, 1:4] = bands(OTHER)[:, :, 1:4]
     np.testing.assert_allclose(after, expected, atol=1e-5)
-    assert asked == ([9] if "sample" in line else [0])
+    assert values == ([9] if "sample" in line else [0])
 
 
 def test_another_code_must_be_given():

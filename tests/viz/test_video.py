@@ -50,9 +50,9 @@ def test_a_film_has_every_frame_and_the_sound(tools, tmp_path):
     sound = subprocess.run(
         [ffmpeg, "-v", "error", "-i", path, "-f", "f32le", "-ac", "1", "pipe:1"], capture_output=True, check=True
     ).stdout
-    heard = np.frombuffer(sound, np.float32)
-    assert 0.75 <= len(heard) / 16_000 <= 0.95
-    assert 0.15 < heard[4000:8000].std() < 0.25
+    samples = np.frombuffer(sound, np.float32)
+    assert 0.75 <= len(samples) / 16_000 <= 0.95
+    assert 0.15 < samples[4000:8000].std() < 0.25
 
 
 @pytest.mark.parametrize("program", ["ffmpeg", "browser"])
