@@ -7,6 +7,8 @@ from experiments.benchmarks.turns import clock
 
 #: Share of the cores above which other processes make a record's times worthless.
 MOST_OTHERS = 0.05
+#: Share of its floor that a time may be below it: rates of the machine differ by a tenth between turns.
+LEAST_OF_FLOOR = 0.9
 #: Cell of a time that means nothing, since :func:`busy`.
 _BUSY = "busy"
 _HEADINGS = (
@@ -38,12 +40,12 @@ def table(records: dict[str, dict[str, Any]]) -> str:
 
 
 def busy(record: dict[str, Any]) -> bool:
-    """Whether the times of a record mean nothing: other processes took the cores, or a time is below its floor, whose
-    rates were then measured beside other work."""
+    """Whether the times of a record mean nothing: other processes took the cores, or a time is clearly below its floor,
+    whose rates were then measured beside other work."""
     floor, which = record["floor"]["seconds"], clock(record["threads"])
     shares = [row.get("others_share") or 0.0 for row in record["rows"]]
     times = [row[which] for row in record["rows"] if which in row]
-    return any(share > MOST_OTHERS for share in shares) or any(seconds < floor for seconds in times)
+    return any(share > MOST_OTHERS for share in shares) or any(seconds < LEAST_OF_FLOOR * floor for seconds in times)
 
 
 def _cells(benchmark: Benchmark, record: dict[str, Any]) -> list[str]:

@@ -149,6 +149,11 @@ def _notes(found: Sequence[Mapping[str, Any]]) -> list[str]:
             "EA is by a classifier of generated frames alone, trained on other recordings; chance is"
             f" {100 * balanced['chance']:.1f} % in the mean over emotions, and the truth's row what can be reached."
         )
+    if len({record.get("emotion_classifier") for record in found}) > 1:
+        lines.append(
+            "Rows and seeds without EA are of another machine, where the classifier was trained again and is not the"
+            " same to the last bit."
+        )
     if any("requested_accuracy" in one for one in scores):
         lines.append(
             "Requests: test speeches in each emotion, with no seed clip; chance is 1 / emotions, and the truth is talk"

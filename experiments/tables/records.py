@@ -7,6 +7,7 @@ existing records.
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -14,13 +15,17 @@ from typing import Any
 
 from a2g_jax.data.corpus import Corpus
 
+#: Field that names the classifier of emotions.
+_CLASSIFIER = "emotion_classifier"
 #: Fields that the records of one table share, in addition to the steps of trained ones.
-_MEASURED = ("corpus", "feature_network", "emotion_classifier", "samples", "units", "split")
+_SHARED = ("corpus", "feature_network", "samples", "units", "split")
+#: Beginnings of the names of scores that depend on the classifier.
+_CLASSIFIED = ("emotion_", "requested_", "above_neutral", "kept neutral")
 
 EXPERIMENTS = Path(__file__).parents[1]
 
 #: Fields that identify a record of a table.
-_IDENTITY = ("variant", "seed", "steps", *_MEASURED)
+_IDENTITY = ("variant", "seed", "steps", _CLASSIFIER, *_SHARED)
 
 
 def name_of(corpus: Corpus) -> str:
@@ -73,14 +78,38 @@ def records(table: str) -> list[dict[str, Any]]:
 
 def current(table: str) -> list[dict[str, Any]]:
     """Records that fit into one table: those with the corpus, feature network, samples and steps of the last trained
-    one, and untrained rows on the same corpus and network."""
+    one, and untrained rows on the same corpus and network.
+
+    Trained again on another processor, a classifier of emotions is another one. Emotions are those of the classifier
+    with the most trained records; the others keep their scores that do not depend on it.
+    """
     found = records(table)
     trained = [record for record in found if record["steps"] > 0]
     if not trained:
         return found
     last = trained[-1]
-    same = [record for record in found if all(record.get(name) == last.get(name) for name in _MEASURED)]
-    return [record for record in same if record["steps"] in (0, last["steps"])]
+    same = [record for record in found if all(record.get(name) == last.get(name) for name in _SHARED)]
+    same = [record for record in same if record["steps"] in (0, last["steps"])]
+    classifiers = Counter(record.get(_CLASSIFIER) for record in same if record["steps"] > 0)
+    most = max(classifiers, key=lambda name: classifiers[name])
+    kept = [record for record in same if record.get(_CLASSIFIER) == most]
+    there = {_row(record) for record in kept}
+    for record in same:
+        if _row(record) not in there:
+            kept.append(_without_emotions(record))
+            there.add(_row(record))
+    return kept
+
+
+def _row(record: Mapping[str, Any]) -> tuple[Any, Any]:
+    return record["variant"], record["seed"]
+
+
+def _without_emotions(record: Mapping[str, Any]) -> dict[str, Any]:
+    """The record without what the classifier found."""
+    scores = {name: score for name, score in record["scores"].items() if not name.startswith(_CLASSIFIED)}
+    fields = {name: value for name, value in record.items() if name not in ("emotions", "requests")}
+    return {**fields, "scores": scores}
 
 
 def append(table: str, record: Mapping[str, Any]) -> None:

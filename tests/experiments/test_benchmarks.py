@@ -105,6 +105,13 @@ def test_times_of_busy_cores_meet_no_target(change):
     assert "19.8" not in line
 
 
+def test_a_time_at_its_floor_counts():
+    """Rates vary between turns, so that a time may be a little below its floor."""
+    ours = {"contender": "a2g_jax", "wall_s": 0.95, "cpu_s": 1.9, "ratio": 1.0, "others_share": 0.0}
+    record = {"threads": 2, "rows": [ours], "floor": {"seconds": 1.0}, "about": {}}
+    assert "floor <= 1.3x: 0.95, met" in line_of(record)
+
+
 def line_of(record):
     return table({"audio2gestures-step": record}).strip().splitlines()[-1]
 

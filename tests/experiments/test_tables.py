@@ -117,6 +117,22 @@ def test_a_table_is_in_the_units_of_its_records_and_states_vectors(folder):
     assert "| old |" not in new  # records in other units do not stand in one table
 
 
+def test_records_of_another_classifier_keep_their_other_scores(folder):
+    """Trained again on another machine it is another one; rows of it continue a table, without emotions."""
+    emotions = {"emotion_accuracy": cell(0.5), "kept neutral": cell(0.4)}
+    for seed in range(3):
+        add("ours", seed, 1.0, scores=emotions, emotion_classifier="first", requests={}, emotions={})
+        add("truth", seed, 0.0, steps=0, scores=emotions, emotion_classifier="first")
+        add("truth", seed, 0.0, steps=0, scores=emotions, emotion_classifier="second")
+    add("theirs", 0, 2.0, scores=emotions, emotion_classifier="first")
+    for seed in (1, 2):
+        add("theirs", seed, 2.0, scores=emotions, emotion_classifier="second", requests={}, emotions={})
+    assert over_seeds(TABLE, "theirs", "fgd") == (2.0, 0.0, 3)
+    assert over_seeds(TABLE, "theirs", "emotion_accuracy")[2] == 1
+    assert over_seeds(TABLE, "ours", "emotion_accuracy")[2] == over_seeds(TABLE, "truth", "kept neutral")[2] == 3
+    assert sum("requests" in record for record in store.current(TABLE)) == 3
+
+
 def test_old_rows_with_a_perceptual_loss_are_marked(folder):
     """Their loss used the network that scores."""
     for name, changes in (("plain", {}), ("+ LPIPS", {"lpips_weight": 0.002})):
