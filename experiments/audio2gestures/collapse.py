@@ -28,7 +28,8 @@ from a2g_jax.models.audio2gestures.codec import Codec
 from a2g_jax.models.base import Condition
 from a2g_jax.training.run import Run
 from experiments.tables.records import append, name_of, path_of, records
-from experiments.tables.runs import Setting, Variant, described, trained
+from experiments.tables.setting import Setting, Variant
+from experiments.tables.training import described, trained
 
 TABLE = "audio2gestures/collapse"
 REPRESENTATIONS = ("6d", "exponential", "directions", "keypoints")

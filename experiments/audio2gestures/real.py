@@ -15,7 +15,7 @@ from pathlib import Path
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
-from experiments.tables.runs import Variant, arguments, setting
+from experiments.tables.setting import Variant, arguments, setting
 
 VARIANTS = {
     "Audio2Gestures without split": Variant({**BASE, "split": False, "sample_codes": True}),

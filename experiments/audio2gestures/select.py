@@ -18,7 +18,7 @@ from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import over_seeds
 from experiments.tables.markdown import compute, render
 from experiments.tables.records import current, path_of
-from experiments.tables.runs import Variant, arguments, setting
+from experiments.tables.setting import Variant, arguments, setting
 
 TABLE = "audio2gestures/selection"
 #: Seeds of the tables.

@@ -17,7 +17,7 @@ from experiments.audio2gestures.settings import BASE
 from experiments.stylized_flow.settings import MOGLOW, TRAINING
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
-from experiments.tables.runs import Variant, arguments, setting
+from experiments.tables.setting import Variant, arguments, setting
 
 OURS, WITHOUT_GAN, WITH_GAN = "Audio2Gestures", "Speech2Gesture without GAN", "Speech2Gesture"
 STYLEGESTURES = "StyleGestures (MoGlow)"

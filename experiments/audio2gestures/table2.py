@@ -13,7 +13,7 @@ from a2g_jax.models import find_model
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 #: The losses on sampled motions that the authors' code adds to the paper's relaxed loss.
 AUTHORS_LOSSES = {"sampled_rotation_weight": 1.0, "sampled_speed_weight": 5.0}

@@ -8,7 +8,7 @@ The tiny preset's losses on sampled motions, which the papers do not have, would
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 #: Metres.
 THRESHOLDS = (0.0, 0.001, 0.002, 0.005, 0.02, 0.05)

@@ -8,7 +8,7 @@ The paper does not give the losses' weights. Ours make each term about as large 
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 STFT, SSIM, LPIPS = {"stft_weight": 0.05}, {"ssim_weight": 0.1}, {"lpips_weight": 0.002}
 

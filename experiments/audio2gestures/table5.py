@@ -8,7 +8,7 @@ The paper trains the Transformer on sequences of 512 frames; here all rows have 
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 VARIANTS = {
     "baseline (TCN without split)": Variant({**BASE, "split": False, "sample_codes": True}),

@@ -8,7 +8,7 @@ One run with a latent space of DCT bands for each seed; edits act on it in gener
 from experiments.audio2gestures.settings import BASE
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import make
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 DCT = "A2G with DCT"
 #: Bands take the place of steps of several frames; 128 points need clips of 128 frames.

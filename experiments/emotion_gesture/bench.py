@@ -17,7 +17,7 @@ from a2g_jax.evaluation.emotion_judge import EmotionJudge
 from a2g_jax.generation.continuation import continue_clips
 from a2g_jax.metrics import beats
 from a2g_jax.training.run import Run
-from experiments.tables.runs import Ruler
+from experiments.tables.ruler import Ruler
 
 #: Frames of a clip, as the paper cuts them, and the first generated one.
 CLIP, FIRST = 60, 10

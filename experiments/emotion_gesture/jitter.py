@@ -21,7 +21,9 @@ from experiments.emotion_gesture.settings import TINY, paper, scaled
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, records
-from experiments.tables.runs import Ruler, Setting, measure, run_table
+from experiments.tables.ruler import Ruler, measure
+from experiments.tables.runs import run_table
+from experiments.tables.setting import Setting
 
 WITHOUT, WITH, STRONG = "without L_smooth", "with L_smooth", "with ten times L_smooth"
 JITTERED = "the jittered motion itself"

@@ -26,7 +26,10 @@ from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.emotion_gesture.table3 import WHOLE
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, records
-from experiments.tables.runs import Ruler, Setting, described, measure, run_table
+from experiments.tables.ruler import Ruler, measure
+from experiments.tables.runs import run_table
+from experiments.tables.setting import Setting
+from experiments.tables.training import described
 
 #: Clips of one call; training recordings that probes are fitted to; frames of them for onsets; steps of the solver.
 _BATCH, _FITTED, _FRAMES, _STEPS = 16, 60, 12_000, 400

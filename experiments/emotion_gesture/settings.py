@@ -12,7 +12,7 @@ from dataclasses import asdict, fields, replace
 from typing import Any
 
 from a2g_jax.models import find_model
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 MODEL = "emotion_gesture"
 _ENTRY = find_model(MODEL)

@@ -21,7 +21,7 @@ from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.training.run import open_run
 from experiments.emotion_gesture.bench import Bench
 from experiments.emotion_gesture.requests import requested, true_emotions
-from experiments.tables.runs import Ruler
+from experiments.tables.ruler import Ruler
 
 RESULTS = Path(__file__).parent / "results"
 

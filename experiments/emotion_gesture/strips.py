@@ -26,7 +26,8 @@ from experiments.motion.rows import Row
 from experiments.motion.speeches import Speech, talk_of_corpus
 from experiments.motion.strips import film_strips
 from experiments.tables.records import results
-from experiments.tables.runs import Setting, folder_of
+from experiments.tables.setting import Setting
+from experiments.tables.training import folder_of
 
 
 def main() -> None:

@@ -14,7 +14,9 @@ from experiments.emotion_gesture.scores import scores_of
 from experiments.emotion_gesture.settings import scaled
 from experiments.tables.claims import Claim
 from experiments.tables.records import append, records
-from experiments.tables.runs import Ruler, Setting, Variant, arguments, measure, run_table, setting
+from experiments.tables.ruler import Ruler, measure
+from experiments.tables.runs import run_table
+from experiments.tables.setting import Setting, Variant, arguments, setting
 
 #: Name of :func:`continued` in records.
 SCORED = "continued clips"

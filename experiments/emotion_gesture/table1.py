@@ -16,7 +16,9 @@ from experiments.emotion_gesture.page import render
 from experiments.emotion_gesture.scores import cell
 from experiments.emotion_gesture.table import Table, parser, setting_of
 from experiments.tables.records import current, path_of
-from experiments.tables.runs import Ruler, Variant, run_table
+from experiments.tables.ruler import Ruler
+from experiments.tables.runs import run_table
+from experiments.tables.setting import Variant
 
 AUDIO, GESTURE = "audio", "gesture"
 #: Clips of a batch, as by ``a2g train emotion_classifier`` with ``--batch-size 32``.

@@ -15,7 +15,7 @@ from experiments.emotion_gesture.table3 import WHOLE
 from experiments.stylized_flow.settings import LINEAR_LAYER
 from experiments.stylized_flow.settings import TRAINING as FLOW_TRAINING
 from experiments.tables.claims import Claim
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 CONSTANT, DIVERSE = "ours (constant)", "ours (diverse)"
 A2G, FLOW, S2G = "Audio2Gestures", "stylized flow", "Speech2Gesture"

@@ -12,7 +12,7 @@ from experiments.emotion_gesture.settings import FULL, ours
 from experiments.emotion_gesture.table import Table, command
 from experiments.emotion_gesture.table3 import WHOLE
 from experiments.tables.claims import Claim
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 LENGTHS = (2, 4, 6, 8, 10)
 ZERO, DUPLICATE, LONGEST = "zero", "duplicate", "L = 10"

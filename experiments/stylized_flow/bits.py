@@ -7,7 +7,10 @@ from a2g_jax.evaluation.likelihood import Likelihood, bits_per_dim, gaussian_bit
 from a2g_jax.training.run import Run
 from experiments.stylized_flow.protocol import Protocol, continued
 from experiments.tables.records import append, records
-from experiments.tables.runs import Ruler, Score, Setting, Variant, described, measure
+from experiments.tables.ruler import Ruler, measure
+from experiments.tables.runs import Score
+from experiments.tables.setting import Setting, Variant
+from experiments.tables.training import described
 
 GAUSSIAN = "conditional Gaussian"
 

@@ -28,7 +28,7 @@ from a2g_jax.metrics import beats, diversity, physical
 from a2g_jax.metrics.intervals import mean_interval
 from a2g_jax.metrics.pointwise import correct_within
 from a2g_jax.training.run import Run
-from experiments.tables.runs import Ruler
+from experiments.tables.ruler import Ruler
 
 
 @dataclass(frozen=True)

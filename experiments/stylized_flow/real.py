@@ -19,7 +19,7 @@ from experiments.stylized_flow.table1 import A2G, LINEAR, MOGLOW, OURS, S2G, row
 from experiments.stylized_flow.tables import with_nulls
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
-from experiments.tables.runs import Variant, arguments, setting
+from experiments.tables.setting import Variant, arguments, setting
 
 #: Takes, and the protocol of each.
 TAKES = {"zeroeggs": "trinity", "beat": "trinity", "ted": "ted"}

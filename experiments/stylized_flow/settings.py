@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.stylized_flow.protocol import PROTOCOLS
-from experiments.tables.runs import Variant
+from experiments.tables.setting import Variant
 
 #: Training of flows: the published schedule and clipping, at a size and for a time that 2 cores allow.
 TRAINING: dict[str, Any] = {

@@ -26,7 +26,8 @@ from a2g_jax.training.state import advance, init_state
 from experiments.stylized_flow.settings import flow, moglow
 from experiments.stylized_flow.table1 import ted_arguments
 from experiments.tables.records import results
-from experiments.tables.runs import Setting, Variant, arguments, described, setting
+from experiments.tables.setting import Setting, Variant, arguments, setting
+from experiments.tables.training import described
 
 #: Steps of a turn: one in five has the reverse pass, so a multiple of five, and enough to approximate that share.
 TURN = 40

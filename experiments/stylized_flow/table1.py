@@ -26,7 +26,7 @@ from experiments.stylized_flow.settings import OTHERS, flow, moglow, published
 from experiments.stylized_flow.tables import with_nulls
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
-from experiments.tables.runs import Variant, arguments, setting
+from experiments.tables.setting import Variant, arguments, setting
 
 #: The paper's flow and MoGlow, and the same with our linear first layer.
 PUBLISHED, MOGLOW = "stylized flow as published", "MoGlow"

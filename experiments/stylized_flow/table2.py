@@ -13,7 +13,7 @@ from experiments.stylized_flow.settings import baseline, flow, published
 from experiments.stylized_flow.tables import with_nulls
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
-from experiments.tables.runs import arguments, setting
+from experiments.tables.setting import arguments, setting
 
 TABLE = "stylized_flow/table2"
 FULL, NO_LOSS, NO_ENCODER, BASELINE = "proposed", "without L_gp", "without global encoder", "baseline"

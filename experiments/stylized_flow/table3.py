@@ -23,7 +23,8 @@ from experiments.stylized_flow.settings import flow, moglow, published
 from experiments.tables.claims import Claim
 from experiments.tables.markdown import compute, draw
 from experiments.tables.records import path_of, records
-from experiments.tables.runs import Ruler, arguments, setting
+from experiments.tables.ruler import Ruler
+from experiments.tables.setting import arguments, setting
 
 TABLE = "stylized_flow/table3"
 PUBLISHED, MOGLOW = "stylized flow as published", "MoGlow"

@@ -2,7 +2,8 @@
 
 from experiments.stylized_flow.protocol import Protocol, nulls
 from experiments.tables.records import append, records
-from experiments.tables.runs import Setting, measure
+from experiments.tables.ruler import measure
+from experiments.tables.setting import Setting
 
 
 def with_nulls(table: str, where: Setting, protocol: Protocol) -> None:

@@ -9,17 +9,8 @@ from a2g_jax.evaluation.scores import Metric
 from a2g_jax.metrics.units import OURS, Units, find_units
 from experiments.tables.claims import Claim, best_over_seeds, judge, over_seeds
 from experiments.tables.records import current, path_of
-from experiments.tables.runs import (
-    WHOLE,
-    Score,
-    Setting,
-    Variant,
-    arguments,
-    baselines,
-    run_table,
-    setting,
-    whole_recordings,
-)
+from experiments.tables.runs import WHOLE, Score, baselines, run_table, whole_recordings
+from experiments.tables.setting import Setting, Variant, arguments, setting
 
 #: Columns of the papers' tables, in their order.
 COLUMNS = (

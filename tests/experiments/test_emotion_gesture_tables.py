@@ -17,7 +17,7 @@ from experiments.emotion_gesture.settings import BASE, PRESET_STEPS, TINY, scale
 from experiments.tables import records as store
 from experiments.tables.claims import Claim
 from experiments.tables.records import append
-from experiments.tables.runs import Ruler
+from experiments.tables.ruler import Ruler
 
 TABLES = {module.__name__.split(".")[-1]: module.TABLE for module in (table1, table2, table3, table4, mining, jitter)}
 ABOUT = {"corpus": "c", "feature_network": "n", "emotion_classifier": "j", "samples": 2, "units": "ours"}

@@ -13,7 +13,7 @@ from a2g_jax.metrics.intervals import Interval
 from a2g_jax.metrics.units import UNITS
 from experiments.stylized_flow import bits
 from experiments.stylized_flow.protocol import Protocol, nulls, starts_of
-from experiments.tables.runs import Ruler
+from experiments.tables.ruler import Ruler
 
 PROTOCOL = Protocol(30, 5, 25)
 

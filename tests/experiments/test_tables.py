@@ -14,11 +14,14 @@ from a2g_jax.features.mel import MelConfig
 from a2g_jax.training.run import Perceptual
 from experiments.audio2gestures import select
 from experiments.tables import records as store
-from experiments.tables import runs
+from experiments.tables import ruler, training
 from experiments.tables.claims import Claim, difference, judge, over_seeds
 from experiments.tables.markdown import render
 from experiments.tables.records import all_tables, append, name_of, records
-from experiments.tables.runs import WHOLE, Ruler, Setting, Variant, _same, check_networks, described, units_of
+from experiments.tables.ruler import Ruler, check_networks, units_of
+from experiments.tables.runs import WHOLE, _same
+from experiments.tables.setting import Setting, Variant
+from experiments.tables.training import described
 
 TABLE = "audio2gestures/made_up"
 
@@ -142,20 +145,21 @@ def test_old_rows_with_a_perceptual_loss_are_marked(folder):
 
 def test_a_perceptual_loss_needs_a_network_that_does_not_score(toy_corpus, monkeypatch):
     where = Setting(toy_corpus.path, Path("score"), Path("runs"), 100, 2, (0,), 1.0)
-    with pytest.raises(InputError, match="felt: has a perceptual loss; give --perceptual"):
-        described("felt", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, where)
-    monkeypatch.setattr(runs, "load_perceptual", lambda folder, corpus: Perceptual(str(folder), None))
+    with pytest.raises(InputError, match="perceptual: has a perceptual loss; give --perceptual"):
+        described("perceptual", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, where)
+    for module in (ruler, training):
+        monkeypatch.setattr(module, "load_perceptual", lambda folder, corpus: Perceptual(str(folder), None))
     own = replace(where, perceptual=Path("loss"))
-    config = described("felt", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, own)[1]
+    config = described("perceptual", Variant({"lpips_weight": 0.1}), {}, 0, toy_corpus, own)[1]
     assert config.perceptual.fingerprint == "loss"
     for weights, refused in (("loss", True), ("others", False)):
-        ruler = Ruler(toy_corpus, SimpleNamespace(fingerprint=weights), 2)
+        scoring = Ruler(toy_corpus, SimpleNamespace(fingerprint=weights), 2)
         if refused:
             with pytest.raises(InputError, match="--perceptual: loss has the weights of --features score"):
-                check_networks(own, ruler)
+                check_networks(own, scoring)
         else:
-            check_networks(own, ruler)
-        check_networks(where, ruler)
+            check_networks(own, scoring)
+        check_networks(where, scoring)
 
 
 def test_a_table_is_scored_in_the_units_of_its_paper():
