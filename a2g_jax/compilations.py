@@ -1,14 +1,22 @@
-"""A persistent cache of compiled programs: XLA needs seconds to compile what runs in milliseconds."""
+"""Compiled programs: a persistent cache of them, since XLA needs seconds to compile what runs in milliseconds, and the
+memory that compiling leaves behind."""
 
 import contextlib
+import ctypes
 import os
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jax
 
 _MOST_BYTES = 500_000_000
 #: Programs that are compiled faster are not kept.
 _LEAST_SECONDS = 0.02
+#: Compilations that are shorter leave little behind.
+_LONG_SECONDS = 0.5
+#: JAX's event at the end of a compilation, before the program runs for the first time.
+_COMPILED = "/jax/core/compile/backend_compile_duration"
 
 
 def keep_compilations() -> None:
@@ -32,3 +40,29 @@ def drop_unfinished(folder: Path) -> None:
         if not program.with_name(program.name.removesuffix("cache") + "atime").exists():
             with contextlib.suppress(OSError):
                 program.unlink()
+
+
+@cache
+def release_after_compiling() -> None:
+    """Give the memory that a long compilation has freed back to the system before the program first runs.
+
+    The compiler's threads free hundreds of megabytes that the C library would keep, in pieces too small for the
+    program's arrays. Only with the GNU C library; called again, it does nothing.
+    """
+    trim = _malloc_trim()
+    if trim is None:
+        return
+
+    def release(event: str, seconds: float, **about: Any) -> None:
+        del about
+        if event == _COMPILED and seconds > _LONG_SECONDS:
+            trim(0)
+
+    jax.monitoring.register_event_duration_secs_listener(release)
+
+
+def _malloc_trim() -> Any:
+    """The function of the GNU C library; None with others."""
+    with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows has no library of no name
+        return ctypes.CDLL(None).malloc_trim
+    return None

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from a2g_jax.compilations import release_after_compiling
 from a2g_jax.errors import InputError
 from a2g_jax.generation.controls import check_rows, check_stored, stored_rows
 from a2g_jax.models.base import Condition, Model
@@ -84,6 +85,7 @@ class Engine:
             self._params, self._summary, self._condition = like._params, like._summary, like._condition
             self._sample, self._advance, self._begin = like._sample, like._advance, like._begin
             return
+        release_after_compiling()
         self._params = jax.device_put(run.params)
         self._summary = jax.device_put(run.summary)
         self._condition = jax.jit(model.condition)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Int, Key
 
+from a2g_jax.compilations import release_after_compiling
 from a2g_jax.data.batch import ClipShape, gather, gather_clips, gather_from_disk
 from a2g_jax.data.batches import BatchMaker, Crops, crops_in, draw_others, draw_starts
 from a2g_jax.data.on_demand import Part
@@ -51,6 +52,7 @@ def step_programs(
     Args:
         devices: which share the clips of a batch; the first one alone if None.
     """
+    release_after_compiling()
     settings = config.train_config
     devices = devices or Devices(jax.devices()[:1])
     mirror_pose = pose_mirror(config.space) if settings.mirror > 0 else None
