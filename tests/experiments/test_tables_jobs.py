@@ -58,11 +58,11 @@ def test_tables_of_one_paper_run_one_at_a_time_and_corpora_beside_them():
 
 
 def test_a_network_is_finished_once_it_has_all_its_steps(tmp_path):
-    job = next(job for job in JOBS if job.name == "judge")
+    job = next(job for job in JOBS if job.name == "flow_loss")
     assert not job.finished(tmp_path)
     for steps in (job.steps - 1, job.steps):
-        (tmp_path / "judge").mkdir(exist_ok=True)
-        write_sealed(tmp_path / "judge" / "run.json", {"format": FORMAT, "version": 1, "steps": steps})
+        (tmp_path / "flow_loss").mkdir(exist_ok=True)
+        write_sealed(tmp_path / "flow_loss" / "run.json", {"format": FORMAT, "version": 1, "steps": steps})
         assert job.finished(tmp_path) == (steps == job.steps)
 
 
