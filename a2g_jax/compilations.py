@@ -53,9 +53,9 @@ def release_after_compiling() -> None:
     if trim is None:
         return
 
-    def release(event: str, seconds: float, **about: Any) -> None:
+    def release(event: str, duration_secs: float, **about: Any) -> None:
         del about
-        if event == _COMPILED and seconds > _LONG_SECONDS:
+        if event == _COMPILED and duration_secs > _LONG_SECONDS:
             trim(0)
 
     jax.monitoring.register_event_duration_secs_listener(release)
